@@ -13,7 +13,7 @@ int cola_power_up(struct cola *self, struct sh_err *err)
     cola_ports_reset(self);
     self->level = COLA_RUN;
     self->measures = 1;
-    self->streams = self->started = self->wants_scan = self->reboots = self->next.is_due = 0;
+    self->streams = self->started = self->wish.lasts = self->reboots = self->next.is_due = 0;
     self->n_waiting = self->since_sent = 0;
     self->telegrams = (uint16_t)(0U - self->spec.near_wrap);
     const int rc = cola_restore(self, err);
@@ -76,7 +76,9 @@ void cola_deliver(struct cola *self)
 {
     if (!self->pending) return;
     cola_follow_dialect(self);
-    self->pending = self->wants_scan = 0;
+    self->pending = 0;
+    scan_wish_take_turn(&self->wish, &self->scan, &self->spec.host);
+    if (!cola_is_measuring(self)) self->wish.lasts = 0; /* polls are answered with any scan */
     const unsigned news = self->watch.on && self->measures ? cola_ports_scan(self) : 0;
     deliver_scan(self);
     cola_ports_report(self, news);
@@ -92,6 +94,9 @@ static void take_frame(void *protocol, const uint8_t *frame, size_t len)
         if (h.t_ns > self->now_ns) self->now_ns = h.t_ns;
         cola_deliver(self); /* the points may overwrite the scan that waits to be sent */
     }
+    struct native_event event;
+    if (h.type == NATIVE_EVENT && native_decode_event(frame + NATIVE_HEADER_LEN, h.length, &event) == SH_OK)
+        cola_geometry_event(self, &event);
     const struct planar_news news = planar_scan_frame(&self->scan, frame);
     if (h.type == NATIVE_POSES) cola_way_add(&self->way, self->scan.scan, frame + NATIVE_HEADER_LEN, h.length);
     if (news.begun)
@@ -103,6 +108,13 @@ static void take_frame(void *protocol, const uint8_t *frame, size_t len)
         self->spec.host.count(self->spec.host.ctx, PROTOCOL_UNITS_LOST, news.broken);
 }
 
+/* A scan shows by itself what it lacks. */
+static void take_gap(void *protocol, uint32_t n_frames)
+{
+    (void)n_frames;
+    cola_geometry_event(protocol, NULL);
+}
+
 static void pass_time(void *protocol, int64_t t_ns)
 {
     struct cola *self = protocol;
@@ -110,7 +122,7 @@ static void pass_time(void *protocol, int64_t t_ns)
     cola_deliver(self);
     cola_geometry_time(self);
     if (t_ns >= self->ports.next_ns) cola_ports_time(self);
-    if (!self->wants_scan || t_ns < self->try_ns) return;
+    if (!self->wish.lasts || t_ns < self->try_ns) return;
     self->try_ns = t_ns + TRY_NS;
     cola_start_scan(self);
 }
@@ -146,7 +158,7 @@ static int owes(const void *protocol)
 static int64_t next_time(const void *protocol)
 {
     const struct cola *self = protocol;
-    const int64_t next_ns = self->wants_scan && self->try_ns < self->ports.next_ns ? self->try_ns : self->ports.next_ns;
+    const int64_t next_ns = self->wish.lasts && self->try_ns < self->ports.next_ns ? self->try_ns : self->ports.next_ns;
     return self->pending || self->next.is_due ? self->now_ns : next_ns;
 }
 
@@ -192,7 +204,8 @@ const struct protocol_ops protocol_cola = {
     .create = cola_create,
     .destroy = free,
     .open = open_at,
-    .frame = take_frame, /* it needs no .gap: a scan shows by itself what it lacks */
+    .frame = take_frame,
+    .gap = take_gap,
     .time = pass_time,
     .input = take_input,
     .owes = owes,

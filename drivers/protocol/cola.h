@@ -9,6 +9,7 @@
 #include "drivers/protocol/cola_watch.h"
 #include "drivers/protocol/cola_way.h"
 #include "drivers/protocol/protocol.h"
+#include "drivers/protocol/scan_wish.h"
 
 enum {
     /* sick_tim takes at most 65535 bytes a transfer. The longest telegram: two distances and two signals of each beam
@@ -52,6 +53,7 @@ struct cola {
         int64_t lines_uhz;
         uint32_t steps;
     } next;
+    int rests;       /* the stream said last that the head does not scan, so its scans have all come; or it has gaps */
     uint32_t field;  /* number in the name of the request at hand, field012 */
     int outputs_due; /* LIDoutputstate is sent once, after the answer */
     struct {         /* the events that the client switched on, and the set of fields that is watched */
@@ -64,8 +66,8 @@ struct cola {
     } ports;
     struct cola_fields fields;
     struct cola_watch watch;
-    int wants_scan; /* a scan was asked for, and none has come yet; try_ns: when to look at the head next */
-    int64_t try_ns;
+    struct scan_wish wish;
+    int64_t try_ns; /* when to look at the head next while the wish lasts */
     int64_t now_ns;
     int streams;                             /* sEN LMDscandata 1 */
     enum cola_form stream_form;              /* of telegrams without a request */
@@ -83,6 +85,11 @@ struct cola {
 
 /* Carries out a request: reads its values, and writes those of the answer. Returns COLA_OK, COLA_LATER or an error. */
 typedef enum cola_error cola_handler(struct cola *self, struct cola_args *args, struct cola_out *out);
+
+static inline int cola_is_measuring(const struct cola *self)
+{
+    return self->measures && (self->started || self->streams);
+}
 
 /* cola.c */
 
@@ -149,6 +156,8 @@ cola_handler cola_read_framing, cola_write_framing;
 const struct planar_head *cola_head(const struct cola *self);
 /* Asks the head for its settings; to be called before each request. */
 void cola_look_at_head(struct cola *self);
+/* An event of the stream, or a gap in it (NULL), which may have had the event that is waited for. */
+void cola_geometry_event(struct cola *self, const struct native_event *event);
 /* Time has passed: answers mLMPsetscancfg once the head's scan has ended. */
 void cola_geometry_time(struct cola *self);
 cola_handler cola_read_scan_cfg, cola_set_scan_cfg;

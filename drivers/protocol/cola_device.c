@@ -163,9 +163,10 @@ int cola_start_scan(struct cola *self)
     const enum protocol_head_state head = protocol_ask_state(&self->spec.host);
     int refused = head == PROTOCOL_HEAD_FAULT || head == PROTOCOL_HEAD_UNKNOWN;
     if (head == PROTOCOL_HEAD_IDLE) refused = self->spec.host.command(self->spec.host.ctx, "SCAN:START", NULL, 0) != 0;
-    /* Until a scan has come, a head that is idle is started again, since somebody may have stopped it. */
-    self->wants_scan = !refused;
+    /* While the wish lasts, a head that is idle is started again, since somebody may have stopped it. */
+    if (!refused && (!self->wish.lasts || head == PROTOCOL_HEAD_IDLE)) scan_wish_make(&self->wish, &self->scan);
     if (!refused) return 0;
+    self->wish.lasts = 0;
     for (uint32_t i = 0; i < self->n_waiting; i++)
         cola_refuse(self, (enum cola_form)self->waiting_form[i], COLA_CONDITION);
     self->n_waiting = 0;
@@ -189,8 +190,8 @@ enum cola_error cola_stop(struct cola *self, struct cola_args *args, struct cola
     const enum cola_error error = cola_args_end(args);
     if (error != COLA_OK) return error;
     self->measures = self->started = 0;
-    self->wants_scan = self->n_waiting != 0; /* a poll is answered also where nothing is measured */
-    cola_ports_select(self);                 /* drops the fields' results: they are out of date from now on */
+    self->wish.lasts &= self->n_waiting != 0; /* a poll is answered also where nothing is measured */
+    cola_ports_select(self);                  /* drops the fields' results: they are out of date from now on */
     cola_put_u(out, 1, 0);
     return COLA_OK;
 }

@@ -118,16 +118,14 @@ static enum cola_error set_head(struct cola *self)
     return COLA_OK;
 }
 
-static int is_turning(const struct cola *self)
+/* Stops the head where it scans. Scans that it had made by then still come while it spins down. Returns 1 once there are
+ * none; 0: not yet; -1: it may not be stopped. */
+static int come_to_rest(struct cola *self)
 {
     const enum protocol_head_state state = protocol_ask_state(&self->spec.host);
-    return state == PROTOCOL_HEAD_SPIN_UP || state == PROTOCOL_HEAD_SCANNING;
-}
-
-/* A scanner takes another geometry only before it was told to measure, or after it was stopped. */
-static int is_measuring(const struct cola *self)
-{
-    return self->measures && (self->started || self->streams);
+    if (state == PROTOCOL_HEAD_SPIN_UP || state == PROTOCOL_HEAD_SCANNING)
+        return self->spec.host.command(self->spec.host.ctx, "SCAN:STOP", NULL, 0) != 0 ? -1 : 0;
+    return state != PROTOCOL_HEAD_SPIN_DOWN || self->rests;
 }
 
 enum cola_error cola_set_scan_cfg(struct cola *self, struct cola_args *args, struct cola_out *out)
@@ -145,16 +143,15 @@ enum cola_error cola_set_scan_cfg(struct cola *self, struct cola_args *args, str
     uint32_t status = cola_geometry_find(self, &asked, &wanted);
     const int other =
         status == OK && (wanted.steps != cola_head(self)->steps || wanted.lines_uhz != cola_head(self)->lines_uhz);
-    if (other && is_measuring(self)) status = OTHER_ERROR;
+    /* A scanner takes another geometry only before it was told to measure, or after it was stopped. */
+    if (other && cola_is_measuring(self)) status = OTHER_ERROR;
     if (other && status == OK) {
         self->next.lines_uhz = (int64_t)wanted.lines_uhz;
         self->next.steps = wanted.steps;
         self->next.form = out->form;
-        if (is_turning(self)) {
-            if (self->spec.host.command(self->spec.host.ctx, "SCAN:STOP", NULL, 0) != 0) return COLA_CONDITION;
-            self->next.is_due = 1;
-            return COLA_LATER;
-        }
+        const int rests = come_to_rest(self);
+        self->next.is_due = rests == 0;
+        if (rests <= 0) return rests < 0 ? COLA_CONDITION : COLA_LATER;
         error = set_head(self);
     }
     cola_put_u(out, 1, status);
@@ -162,12 +159,19 @@ enum cola_error cola_set_scan_cfg(struct cola *self, struct cola_args *args, str
     return error;
 }
 
+void cola_geometry_event(struct cola *self, const struct native_event *event)
+{
+    if (event != NULL && event->code != NATIVE_EV_STATE) return;
+    self->rests = event == NULL || (event->a != PROTOCOL_HEAD_SPIN_UP && event->a != PROTOCOL_HEAD_SCANNING);
+}
+
 void cola_geometry_time(struct cola *self)
 {
     struct cola_out out = {.buf = self->unit, .cap = sizeof self->unit};
-    if (!self->next.is_due || is_turning(self)) return;
+    const int rests = self->next.is_due ? come_to_rest(self) : 0; /* another session may have started it again */
+    if (rests == 0) return;
     self->next.is_due = 0;
-    const enum cola_error error = set_head(self);
+    const enum cola_error error = rests < 0 ? COLA_CONDITION : set_head(self);
     if (error != COLA_OK) {
         cola_refuse(self, self->next.form, error);
         return;

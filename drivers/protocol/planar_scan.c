@@ -61,6 +61,7 @@ static void take_descriptor(struct planar_scan *s, const struct native_descripto
     if ((flags & NATIVE_LOCAL) != 0 && !repeated) s->fresh = s->done = 1;
     s->scan = d->scan;
     s->pan_counts = d->pan_counts_per_turn;
+    h->frames = d->frames;
     h->lines_uhz = d->lines_uhz;
     h->prr_uhz = d->prr_uhz;
     h->range_min_m = d->range_min_m;

@@ -27,6 +27,7 @@ struct planar_head {
     int known;         /* 0: none came, or it is not planar, or has more steps than fit. The rest is then void */
     uint32_t steps, n; /* steps of a turn; those that are cast */
     int32_t first, last, front; /* steps; front looks along y and may lie outside of first..last */
+    uint32_t frames;            /* of a scan, which then ends by itself; 0: it goes on until it is stopped */
     uint64_t lines_uhz, prr_uhz;
     double range_min_m, range_max_m, m_per_count;
     int attributes; /* points have amplitudes, unless these are not modelled */
@@ -48,10 +49,11 @@ struct planar_scan {
     struct planar_head head;
     const struct planar_turn *whole; /* the last whole turn; NULL: none with these steps came yet */
     int64_t t0_ns;                   /* of step 0 of the turn at hand or the last one; INT64_MIN: none yet */
+    uint32_t scan;                   /* the head's number of the scan at hand */
     /* the members below are for planar_scan.c alone */
     struct planar_turn *now; /* being filled: the one that is not `whole` */
     struct native_emitter emitter;
-    uint32_t scan, line, number0; /* number0: turns of the scans before */
+    uint32_t line, number0; /* number0: turns of the scans before */
     int64_t scan_t0_ns;
     int seen, fresh, done; /* a turn was seen; pulses missed so far are no loss; the present turn needs no more */
     uint32_t n_seen;       /* places that have their pulse */

@@ -33,20 +33,22 @@ static const char *quit(struct scip *s)
     return "00";
 }
 
-/* The speed is the sensor's: another session, which is over by now, may have changed it. */
-static void reset_speed(struct scip *s)
+/* The speed is the sensor's: another session, which is over by now, may have changed it. 0, or the error of the head,
+ * which another session may control. */
+static int reset_speed(struct scip *s)
 {
-    if ((s->features & SCIP_MOTOR_SPEED) != 0 &&
-        scip_lines_uhz(s, "HEAD:LINES?") != scip_lines_uhz(s, "HEAD:LINES? DEF"))
-        s->host.command(s->host.ctx, "HEAD:LINES DEF", NULL, 0);
+    if ((s->features & SCIP_MOTOR_SPEED) == 0 ||
+        scip_lines_uhz(s, "HEAD:LINES?") == scip_lines_uhz(s, "HEAD:LINES? DEF"))
+        return 0;
+    return s->host.command(s->host.ctx, "HEAD:LINES DEF", NULL, 0);
 }
 
 /* RT: RS without the timer and the bit rate. */
 static const char *reset(struct scip *s)
 {
+    if (reset_speed(s) != 0) return "10";
     quit(s);
     s->simulation = (struct scip_simulation){0};
-    reset_speed(s);
     if (s->line[1] == 'S') {
         s->epoch_ns = s->epoch_us_ns = s->now_ns;
         s->bit_rate = s->model->bit_rate;

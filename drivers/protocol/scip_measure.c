@@ -93,15 +93,16 @@ const char *scip_measure(struct scip *s)
         return NULL;
     }
     s->stream = request;
+    scan_wish_make(&s->wish, &s->scan);
     s->simulation.n_waiting = 0; /* a new stream has all phases of DB, from the first on */
     return "00";
 }
 
-/* Starts the head again while no scan has come: it may have been about to stop when it was asked for scans. Once a scan
- * has come, a stop is intended, and the head is left alone. */
+/* Starts the head again while it is not known to scan on: it may have been about to stop when it was asked for scans.
+ * Once it scans, a later stop is intended, and the head is left alone. */
 static void wake_head(struct scip *s)
 {
-    const int waits = s->single.active || (s->stream.active && s->stream.sent == 0);
+    const int waits = s->single.active || (s->stream.active && s->wish.lasts);
     if (!waits || s->now_ns < s->try_ns) return;
     s->try_ns = scip_laser_on(s) == NULL ? s->now_ns + TRY_NS : INT64_MAX;
 }
@@ -250,5 +251,8 @@ void scip_scans_came(struct scip *s, struct planar_news news)
         s->single.active = 0;
         send_scan(s, &s->single, "00");
     }
-    if (streams && s->scan.whole->t0_ns >= s->stream.after_ns) stream_scan(s);
+    if (streams && s->scan.whole->t0_ns >= s->stream.after_ns) {
+        scan_wish_take_turn(&s->wish, &s->scan, &s->host);
+        stream_scan(s);
+    }
 }

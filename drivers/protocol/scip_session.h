@@ -6,6 +6,7 @@
 
 #include "drivers/protocol/planar_scan.h"
 #include "drivers/protocol/protocol.h"
+#include "drivers/protocol/scan_wish.h"
 #include "drivers/protocol/scip_model.h"
 #include "drivers/protocol/scip_reply.h"
 
@@ -45,6 +46,7 @@ struct scip {
     uint32_t bit_rate;
     int64_t rb_ns, reboot_ns; /* time of the last single RB; time of the reboot that RB RB asked for; INT64_MIN: none */
     struct scip_request stream, single;
+    struct scan_wish wish; /* of stream */
     struct scip_simulation simulation;
     /* the line at hand */
     char line[SCIP_MAX_LINE];

@@ -139,7 +139,7 @@ static int set_phase_lock(const struct posted *p, const char *value)
     return command(p, on ? "HEAD:PHASE:LOCK ON" : "HEAD:PHASE:LOCK OFF");
 }
 
-/* Reads a decimal number from 0 to below the limit. Returns 1, or 0 if it is none. */
+/* Reads a decimal number from 0 to below the limit, which is half a step above the largest that is allowed. Returns 1, or 0 if it is none. */
 static int read_decimal(const char *s, double limit, double *out)
 {
     char *end;
@@ -154,8 +154,8 @@ static int set_phase(const struct posted *p, const char *value)
 {
     char line[40];
     double cdeg;
-    if (!read_decimal(value, 36000.0, &cdeg)) return refuse(p, 400, "offset: allowed are 0 to 35999, in 0.01 degree");
-    const long whole = (long)(cdeg + 0.5) % 36000;
+    if (!read_decimal(value, 35999.5, &cdeg)) return refuse(p, 400, "offset: allowed are 0 to 35999, in 0.01 degree");
+    const long whole = (long)(cdeg + 0.5);
     snprintf(line, sizeof line, "HEAD:PHASE %ld.%02ld", whole / 100, whole % 100);
     return command(p, line);
 }
@@ -164,7 +164,8 @@ static int set_phase(const struct posted *p, const char *value)
 static int check_phase_input(const struct posted *p, const char *value)
 {
     double deg;
-    return read_decimal(value, 360.0, &deg) ? 200 : refuse(p, 400, "offsetInput: allowed are 0 to 359.99, in degrees");
+    return read_decimal(value, 359.995, &deg) ? 200
+                                              : refuse(p, 400, "offsetInput: allowed are 0 to 359.99, in degrees");
 }
 
 /* A head without a settings file stores nothing, but answers 200: clients expect that a device takes this form. */

@@ -186,6 +186,7 @@ struct command_device {
     struct head_settings settings; /* as they are now; a refused command leaves them */
     struct head_settings defaults; /* what *RST restores */
     enum head_state state;
+    int stops; /* 1: the state is spin-down by a command, and the scan's last pulses are still on their way */
     const char *why_fault; /* why the state is fault, and what ends it; NULL: not known */
     struct command_queue queue;
     uint32_t control; /* session that has control; 0: none, and the next one that changes something takes it */
@@ -232,6 +233,7 @@ enum command_effect {
 
 struct command_result {
     enum command_effect effect;
+    int for_next_scan; /* COMMAND_SETTINGS: this value can't change within a scan, and holds from the next one on */
     int64_t step_ns;
     int have_pose;
     double pose[6];   /* of the platform at the end of the step: x, y, z (m), roll, pitch, heading (degrees) */

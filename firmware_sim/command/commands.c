@@ -231,9 +231,11 @@ static int act_start(struct command_call *call)
     return command_accept(call, COMMAND_START); /* the recording begins anew */
 }
 
+/* Journals of earlier heads may stop a scan again while its last pulses are on their way: these heads took that. */
 static int act_stop(struct command_call *call)
 {
-    return call->dev->is_played ? command_accept(call, COMMAND_STOP) : act_event(call, COMMAND_STOP);
+    const int again = call->session == 0 && call->dev->stops;
+    return call->dev->is_played || again ? command_accept(call, COMMAND_STOP) : act_event(call, COMMAND_STOP);
 }
 
 static int act_reset(struct command_call *call)

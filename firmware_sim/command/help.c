@@ -107,7 +107,8 @@ static int help_describe(struct command_call *call)
     const struct command_row *row = call->row;
     const struct command_setting *setting = row->setting;
     if (setting == NULL) {
-        add(call, "%s,\"%s\",,,,,", row->act == NULL ? "query" : "action", row->unit != NULL ? row->unit->name : "");
+        const char *kind = row->act == NULL ? "query" : row->query == NULL ? "action" : "setting";
+        add(call, "%s,\"%s\",,,,,", kind, row->unit != NULL ? row->unit->name : "");
         add_states(call);
         add(call, ",\"\"");
         return 0;

@@ -436,6 +436,8 @@ int command_setting_change(struct command_call *call)
         return command_fail(call, CMD_E_SETTINGS, "%s: %s", call->row->header, why);
     }
     call->out->effect = COMMAND_SETTINGS;
+    call->out->for_next_scan = !command_setting_is_free(dev, call->row->setting, HEAD_SCANNING) &&
+                               read_value(call, &before) != read_value(call, &dev->settings);
     if (call->row->setting->derived != NULL)
         return command_reply(call, "%s", in_unit(call, read_value(call, &dev->settings)).text);
     return command_reply(call, "OK");

@@ -8,9 +8,10 @@
 
 _Static_assert((int)COMMAND_PEERS == (int)DEVICE_MAX_SESSIONS + 1, "each session has a place for its client's name");
 
-static void change_settings(struct device *device)
+/* A stopped scan has its last pulses in the next tick. What can't change within a scan leaves that tick alone. */
+static void change_settings(struct device *device, const struct command_result *command)
 {
-    if (!device->scan.on) return;
+    if (!device->scan.on || (device->scan.stop_requested && command->for_next_scan)) return;
     struct schedule_spec spec;
     if (device->cmd.settings.lines_uhz != device->scan.lines_uhz) device->beam.held_uhz = 0; /* until the next PPS */
     device_fill_spec(&device->beam, device->scan.site, &spec);
@@ -21,18 +22,19 @@ static void change_settings(struct device *device)
 
 static void stop(struct device *device, enum head_event event, uint64_t tick)
 {
+    device->machine.n_stopped = device->machine.n_changes;
     if (device->scan.on)
         device->scan.stop_requested = 1; /* the next claim ends the scan, and then the state changes */
     else
         device_transition(device, event, tick);
 }
 
-static void carry_out(struct device *device, enum command_effect effect, uint64_t released)
+static void carry_out(struct device *device, const struct command_result *command, uint64_t released)
 {
-    switch (effect) {
+    switch (command->effect) {
     case COMMAND_MOVE: /* the caller begins the move; change_settings does nothing where no scan is on */
     case COMMAND_SETTINGS:
-        change_settings(device);
+        change_settings(device, command);
         break;
     case COMMAND_START:
         device_transition(device, HEAD_EV_START, released);
@@ -102,7 +104,7 @@ static void do_command(struct device *device, uint32_t session, const char *line
                        struct command_result *out)
 {
     struct command_device *cmd = &device->cmd;
-    cmd->state = device_visible_state(device, released);
+    cmd->state = device_visible_state(device, released, &cmd->stops);
     cmd->t_ns = (int64_t)released * device->tick_ns;
     device->desk.now_ns = (int64_t)device->next_tick * device->tick_ns;
     cmd->fixed = why_fixed(device, session);
@@ -124,7 +126,7 @@ static void do_command(struct device *device, uint32_t session, const char *line
         device_push_error(&device->events, session, out->error, command_error_text(out->error));
     else if (out->changes && device->journal.out != NULL && out->effect != COMMAND_STEP && out->effect != COMMAND_MOVE)
         journal_write(device->journal.out, device->next_tick, cmd->t_ns, session, line);
-    if (out->error == 0) carry_out(device, out->effect, released);
+    if (out->error == 0) carry_out(device, out, released);
 }
 
 void device_carry_out_line(struct device *device, const char *line)

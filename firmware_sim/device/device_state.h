@@ -48,6 +48,9 @@ struct device_machine {
         enum head_state state;
     } change[DEVICE_MAX_CHANGES];
     uint32_t n_changes; /* in the whole run, power cycles included */
+    /* A command ended the movement that changes with a lower number tell of. Clients see that at once, though ticks that
+     * are claimed already still have the scan's pulses. */
+    uint32_t n_stopped;
 };
 
 /* When power last went, and when it came back or will. */
@@ -124,7 +127,9 @@ struct device {
 void device_transition(struct device *device, enum head_event event, uint64_t tick);
 /* Makes the timed transitions that are due at the tick. */
 void device_run_timers(struct device *device, uint64_t tick);
-enum head_state device_visible_state(const struct device *device, uint64_t released);
+/* Returns the state that clients see at a released tick. *stops: 1 where that is spin-down by a command, while the
+ * scan's last pulses are still on their way. */
+enum head_state device_visible_state(const struct device *device, uint64_t released, int *stops);
 /* Ticks of a time, rounded up. */
 uint64_t device_ticks_of(const struct device *device, double s);
 

@@ -5,12 +5,17 @@
 #include "firmware_sim/config/profile.h"
 #include "firmware_sim/device/device_state.h"
 
-enum head_state device_visible_state(const struct device *device, uint64_t released)
+enum head_state device_visible_state(const struct device *device, uint64_t released, int *stops)
 {
     const struct device_machine *machine = &device->machine;
+    *stops = 0;
     for (uint32_t age = 1; age <= machine->n_changes && age <= DEVICE_MAX_CHANGES; age++) {
-        const struct device_state_change *change = &machine->change[(machine->n_changes - age) % DEVICE_MAX_CHANGES];
-        if (change->tick <= released) return change->state;
+        const uint32_t number = machine->n_changes - age;
+        const struct device_state_change *change = &machine->change[number % DEVICE_MAX_CHANGES];
+        if (change->tick > released) continue;
+        const int moves = change->state == HEAD_SPIN_UP || change->state == HEAD_SCANNING;
+        *stops = moves && number < machine->n_stopped;
+        return *stops ? HEAD_SPIN_DOWN : change->state;
     }
     return HEAD_OFF;
 }

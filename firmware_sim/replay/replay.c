@@ -28,8 +28,10 @@ static struct wishes take_wishes(struct replay *r, uint64_t tick, int is_late)
     const int stops = r->wants_stop && r->playing, ready = r->n_clients >= (int)r->options.clients;
     if (r->wants_stop) r->wants_again = r->wants_seek = 0;
     r->wants_stop = 0;
+    if (stops) r->stopped = r->n_changes + 1;
     wishes.starts = !is_late && ((r->wants_start && ready) || r->wants_again || r->wants_seek);
     if (wishes.starts) {
+        if (!r->wants_again) r->begun = r->n_changes + 1; /* replay_begin adds a change */
         r->begin_s = r->wants_seek ? r->seek_s : r->options.from_s;
         r->wants_start = r->wants_again = r->wants_seek = 0;
         r->playing = 1;

@@ -15,12 +15,25 @@ void replay_set_state(struct replay *r, uint64_t tick, enum head_state state)
     r->change[r->n_changes++ % REPLAY_CHANGES] = (struct replay_change){tick, state};
 }
 
-/* Returns the state at the last released tick. */
-static enum head_state visible_state(const struct replay *r, uint64_t released)
+/* Returns the number of the last change that is released, plus 1; 0: none that is kept. */
+static uint32_t find_change(const struct replay *r, uint64_t released)
 {
     for (uint32_t i = r->n_changes; i > 0 && i + REPLAY_CHANGES > r->n_changes; i--)
-        if (r->change[(i - 1) % REPLAY_CHANGES].tick < released) return r->change[(i - 1) % REPLAY_CHANGES].state;
-    return HEAD_IDLE;
+        if (r->change[(i - 1) % REPLAY_CHANGES].tick < released) return i;
+    return 0;
+}
+
+/* Returns the state at the last released tick. A command to begin or to end the playing is seen at once. */
+static enum head_state visible_state(const struct replay *r, uint64_t released)
+{
+    const uint32_t i = find_change(r, released);
+    const enum head_state state = i != 0 ? r->change[(i - 1) % REPLAY_CHANGES].state : HEAD_IDLE;
+    const int moves = state == HEAD_SPIN_UP || state == HEAD_SCANNING, is_to_begin = i < r->begun;
+    const int ready = r->n_clients >= (int)r->options.clients;
+    const int stops = r->wants_stop || i < r->stopped;
+    if ((r->wants_start && ready) || r->wants_seek || (is_to_begin && r->begun > r->stopped && !r->wants_stop))
+        return moves && !stops ? state : HEAD_SPIN_UP;
+    return stops && (moves || is_to_begin) ? HEAD_SPIN_DOWN : state;
 }
 
 static int64_t to_nm(double m)

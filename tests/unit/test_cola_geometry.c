@@ -2,6 +2,8 @@
 /* CoLa: line rate and step of a head that has several, by mLMPsetscancfg. */
 #include "tests/unit/cola_rig.h"
 
+#include "drivers/protocol/native_encode.h"
+
 /* The head answers with the first row that fits. Tests change rows. */
 enum { STATE, LINES, STEP, STOP, SET_LINES, SET_STEP, END };
 static struct protocol_rig_reply head[END + 1];
@@ -30,6 +32,15 @@ static void open_lms(void)
     cola.identity.geometry[1] = (struct protocol_geometry){25000000, 1440};
     cola.identity.geometry[2] = (struct protocol_geometry){25000000, 720};
     cola_authorise();
+}
+
+/* The stream says that the head's state is another: frames of the state before have all come. */
+static void state_event(enum protocol_head_state state)
+{
+    uint8_t frame[256];
+    const struct native_event event = {.code = NATIVE_EV_STATE, .a = (uint64_t)state};
+    const size_t len = native_encode_event(frame, sizeof frame, &event, 0, 0);
+    cola.ops->frame(cola.protocol, frame, len);
 }
 
 #define FAST   " 1388 1 1388 FFF92230 225510" /* 50 Hz, 0.5 deg */
@@ -115,10 +126,12 @@ static void a_scan_is_stopped_first(void **state)
         cola_input("\2sMN mLMPsetscancfg" FAST "\3", strlen("\2sMN mLMPsetscancfg" FAST "\3"));
         assert_int_equal(cola.n_units, 0);
         expect_set("SCAN:STOP", NULL, NULL);
+        is_set("spin-down", "25", "0.25"); /* at once, though scans that were made before still come */
         cola.ops->time(cola.protocol, 1000000);
         assert_int_equal(cola.n_units, 0);
         expect_set("SCAN:STOP", NULL, NULL);
         is_set("spin-down", "50", "0.5");
+        state_event(PROTOCOL_HEAD_SPIN_DOWN);
         cola.ops->time(cola.protocol, 2000000);
         expect_set("SCAN:STOP", "HEAD:LINes 50.000000", "SCAN:STEP 0.500000000");
         assert_int_equal(cola.n_units, 1);
@@ -126,9 +139,30 @@ static void a_scan_is_stopped_first(void **state)
         assert_int_equal(cola.len, sizeof answer - 1);
         assert_memory_equal(cola.bytes, answer, cola.len);
         is_set("scanning", "25", "0.25");
+        state_event(PROTOCOL_HEAD_SCANNING);
     }
     head[STOP].error = -221;
     cola_expect("sMN mLMPsetscancfg" FAST, "sFA 4");
+}
+
+/* Another session has stopped the head, and starts it again. Where the event has passed before, an idle head answers. */
+static void a_head_that_is_started_again_is_stopped_again(void **state)
+{
+    (void)state;
+    open_lms();
+    is_set("spin-down", "25", "0.25");
+    protocol_rig_clear(&cola);
+    cola_input("\2sMN mLMPsetscancfg" FAST "\3", strlen("\2sMN mLMPsetscancfg" FAST "\3"));
+    cola.ops->time(cola.protocol, 1000000);
+    expect_set(NULL, NULL, NULL);
+    is_set("spin-up", "25", "0.25");
+    cola.ops->time(cola.protocol, 2000000);
+    assert_int_equal(cola.n_units, 0);
+    expect_set("SCAN:STOP", NULL, NULL);
+    is_set("idle", "25", "0.25");
+    cola.ops->time(cola.protocol, 3000000);
+    assert_int_equal(cola.n_units, 1);
+    expect_set("SCAN:STOP", "HEAD:LINes 50.000000", "SCAN:STEP 0.500000000");
 }
 
 /* The answer has the form of its request, CoLa-B too, though it comes later. So has a refusal. */
@@ -146,6 +180,10 @@ static void a_late_answer_has_the_form_of_its_request(void **state)
         cola_input(frame, cola_frame_b(frame, request, sizeof request - 1));
         assert_int_equal(cola.n_units, 0);
         is_set("spin-down", "50", "0.5");
+        if (refused)
+            cola.ops->gap(cola.protocol, 1); /* the event may have been lost */
+        else
+            state_event(PROTOCOL_HEAD_SPIN_DOWN);
         cola.ops->time(cola.protocol, 1000000);
         assert_int_equal(cola.n_units, 1);
         const size_t len = refused ? cola_frame_b(frame, "sFA\0\4", 5) : cola_frame_b(frame, answer, sizeof answer - 1);
@@ -177,6 +215,7 @@ int main(void)
         CASE(other_pairs_are_refused),
         CASE(a_resting_head_is_set),
         CASE(a_scan_is_stopped_first),
+        CASE(a_head_that_is_started_again_is_stopped_again),
         CASE(the_range_stays_on_the_new_grid),
         CASE(a_late_answer_has_the_form_of_its_request),
     };

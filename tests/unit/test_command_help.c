@@ -55,13 +55,13 @@ static const struct {
     {"HEAD:STORe", "action,\"\",,,,," ALL ",\"\""},
     {"SCAN:STARt", "action,\"\",,,,,\"idle\",\"\""},
     {"SCAN:STOP", "action,\"\",,,,,\"spin-up scanning\",\"\""},
-    {"SCAN:REPLay", "action,\"s\",,,,," ALL ",\"\""},
-    {"SITE:POSE", "action,\"m, deg\",,,,,\"idle\",\"\""},
+    {"SCAN:REPLay", "setting,\"s\",,,,," ALL ",\"\""},
+    {"SITE:POSE", "setting,\"m, deg\",,,,,\"idle\",\"\""},
     {"FAULt:ADD", "action,\"\",,,,," ALL ",\"\""},
     {"FAULt:LIST", "query,\"\",,,,," ALL ",\"\""},
     {"TIME:STEP", "action,\"ns\",,,,," ALL ",\"\""},
-    {"TIME:SHIFt", "action,\"ns\",,,,," ALL ",\"\""},
-    {"TIME:SERVer", "action,\"s, h\",,,,," ALL ",\"\""},
+    {"TIME:SHIFt", "setting,\"ns\",,,,," ALL ",\"\""},
+    {"TIME:SERVer", "setting,\"s, h\",,,,," ALL ",\"\""},
 };
 
 static void every_setting_is_described_whole(void **state)

@@ -117,6 +117,81 @@ static void a_stop_in_spin_up_never_scans(void **state)
     rig_close(rig);
 }
 
+static void is_refused(struct rig *rig, const char *line, uint64_t released, const char *reply)
+{
+    struct command_result result;
+    device_command(rig->device, 1, line, released, &result);
+    assert_int_equal(result.error, -221);
+    assert_string_equal(result.reply, reply);
+}
+
+/* Released ticks end 65 before those that are claimed. A client that has its OK reads the state after the stop. */
+static void a_stop_is_seen_at_once(void **state)
+{
+    (void)state;
+    struct rig *rig = rig_open(NULL, NULL, 0);
+    for (int resets = 0; resets < 2; resets++) {
+        const uint64_t start = resets ? 700 : 300, stop = start + 100;
+        rig_go_to(rig, start);
+        rig_tell(rig, "SCAN:START", start);
+        rig_go_to(rig, stop + 65);
+        assert_string_equal(rig_state(rig, stop), "scanning");
+        rig_tell(rig, resets ? "*RST" : "SCAN:STOP", stop);
+        for (int is_claimed = 0; is_claimed < 2; is_claimed++) {
+            assert_string_equal(rig_state(rig, stop), "spin-down");
+            assert_string_equal(rig_tell(rig, "*STB?", stop), is_claimed ? "4" : resets ? "4" : "0");
+            is_refused(rig, "SCAN:START", stop,
+                       "ERR -221,\"Settings conflict; SCAN:STARt is not possible in state spin-down\"");
+            is_refused(rig, "SCAN:STOP", stop,
+                       "ERR -221,\"Settings conflict; SCAN:STOP is not possible in state spin-down\"");
+            assert_true(rig_claim(rig));
+            assert_int_equal(rig_event(rig, NATIVE_EV_SCAN_END) != NULL, !is_claimed);
+        }
+        for (uint64_t released = stop + 1; released < rig->next; released++)
+            assert_string_equal(rig_state(rig, released), "spin-down");
+        rig_go_to(rig, rig->next + 60);
+        assert_string_equal(rig_state(rig, rig->next), "idle");
+    }
+    rig_close(rig);
+}
+
+/* A scan of 500 ms that began at 330 has ended by itself in a claimed tick, which is not released. */
+static void a_stop_of_a_scan_that_ends_is_seen_at_once(void **state)
+{
+    (void)state;
+    struct rig *rig = rig_open(NULL, NULL, 0);
+    rig_go_to(rig, 300);
+    rig_tell(rig, "SCAN:START", 300);
+    rig_go_to(rig, 850);
+    assert_string_equal(rig_state(rig, 800), "scanning");
+    rig_tell(rig, "SCAN:STOP", 800);
+    assert_string_equal(rig_state(rig, 800), "spin-down");
+    rig_go_to(rig, 900);
+    assert_string_equal(rig_state(rig, 899), "idle");
+    rig_close(rig);
+}
+
+/* The state allows settings of the next scan. The stopped scan's last pulses keep the settings that they fired with. */
+static void a_stopped_scan_keeps_its_settings(void **state)
+{
+    (void)state;
+    struct rig *rig = rig_open(NULL, NULL, 0);
+    rig_go_to(rig, 300);
+    rig_tell(rig, "SCAN:START", 300);
+    rig_go_to(rig, 400);
+    rig_tell(rig, "SCAN:STOP", 400);
+    rig_tell(rig, "HEAD:STATION 2", 400);
+    rig_tell(rig, "HEAD:RANGE:MAX 50", 400);
+    assert_true(rig_claim(rig) && rig->work.scanning && rig->work.station == 0 && !rig->work.describe);
+    assert_null(rig_event(rig, NATIVE_EV_SETTINGS));
+    assert_non_null(rig_event(rig, NATIVE_EV_SCAN_END));
+    rig_go_to(rig, 500);
+    rig_tell(rig, "SCAN:START", 500);
+    rig_wait(rig, NATIVE_EV_SCAN_START, 100);
+    assert_true(rig->work.station == 1 && rig->work.descriptor.range_max_m == 50.0);
+    rig_close(rig);
+}
+
 /* A grant of time is no command of the session, and a journal has only commands. */
 static void a_journal_has_no_steps(void **state)
 {
@@ -292,6 +367,7 @@ static const struct {
     const char *line;
 } session[] = {{50, 10, "HEAD:PRR 500000"}, {300, 65, "SCAN:START"},    {360, 65, "HEAD:PRR 123456.789"},
                {360, 65, "HEAD:LINES 40"},  {377, 65, "SCAN:FRAMES 0"}, {500, 65, "SCAN:STOP"},
+               {500, 65, "SCAN:STOP"},      {501, 65, "SCAN:STOP"}, /* journals of earlier heads may stop it again */
                {700, 20, "HEAD:STATION 2"}, {701, 0, "SCAN:START"},     {900, 65, "*RST"},
                {1100, 65, "SCAN:FRAMES 1"}, {1100, 65, "SCAN:START"}};
 
@@ -310,6 +386,7 @@ static struct device_work *run_session(const struct device_options *options, int
         assert_true(rig_claim(rig));
         works[rig->work.tick] = rig->work;
     }
+    assert_int_equal(rig->device->journal.n_refused, 0);
     assert_true(device_last_scan(rig->device, NULL) == 3);
     rig_close(rig);
     return works;
@@ -355,6 +432,9 @@ int main(void)
         cmocka_unit_test(a_command_reaches_the_beam_within_100_ms),
         cmocka_unit_test(no_spin_up_time_starts_with_the_next_tick),
         cmocka_unit_test(a_stop_in_spin_up_never_scans),
+        cmocka_unit_test(a_stop_is_seen_at_once),
+        cmocka_unit_test(a_stop_of_a_scan_that_ends_is_seen_at_once),
+        cmocka_unit_test(a_stopped_scan_keeps_its_settings),
         cmocka_unit_test(frames_are_counted_with_the_one_that_runs),
         cmocka_unit_test(a_journal_has_no_steps),
         cmocka_unit_test(a_head_at_rest_describes_itself_each_second),

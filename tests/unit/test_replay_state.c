@@ -217,6 +217,45 @@ static void a_command_seeks_paces_and_loops(void **state)
     free(cfg);
 }
 
+/* A replay is released up to tick 0 all the time, and ticks ahead of it are made. The state follows commands at once. */
+static void a_command_is_seen_at_once(void **state)
+{
+    (void)state;
+    static const struct {
+        uint64_t tick;
+        const char *line, *before, *after; /* `after`: when the tick is made */
+    } rows[] = {{0, "SCAN:START", "spin-up", "spin-up"},
+                {1, "SCAN:STOP", "spin-down", "spin-down"},
+                {2, "SCAN:START", "spin-up", "spin-up"},
+                {3, "*RST", "spin-down", "spin-down"},
+                {4, "SCAN:REPL 0.003", "spin-up", "spin-up"}};
+    struct config *cfg = config_new();
+    event_recording_write(file_path, 20);
+    const struct replay_options options = {.path = file_path, .speed = 1};
+    struct replay *r = open_replay(cfg, &options);
+    struct ring_tick tick;
+    assert_string_equal(said(r, "HEAD:STATE?"), "idle");
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        assert_string_equal(said(r, rows[i].line), "OK");
+        assert_string_equal(said(r, "HEAD:STATE?"), rows[i].before);
+        assert_int_equal(replay_source.next(r, rows[i].tick, 0, 0, &tick), LOOP_SOURCE_TICK);
+        assert_string_equal(said(r, "HEAD:STATE?"), rows[i].after);
+    }
+    struct command_result released;
+    replay_source.command(r, 1, "HEAD:STATE?", 9, &released);
+    assert_string_equal(released.reply, "scanning");
+    replay_source.command(r, 1, "SCAN:STOP", 9, &released);
+    replay_source.command(r, 1, "HEAD:STATE?", 9, &released);
+    assert_string_equal(released.reply, "spin-down");
+    assert_int_equal(replay_source.next(r, 10, 0, 0, &tick), LOOP_SOURCE_TICK);
+    replay_source.command(r, 1, "HEAD:STATE?", 9, &released);
+    assert_string_equal(released.reply, "spin-down");
+    replay_source.command(r, 1, "HEAD:STATE?", 11, &released);
+    assert_string_equal(released.reply, "idle");
+    replay_free(r);
+    free(cfg);
+}
+
 /* A part ends 0.5 ms after its last frame. A seek to a time between these two goes to the end, where a loop begins
  * anew. */
 static void a_seek_to_the_end_of_a_part_is_its_end(void **state)
@@ -294,6 +333,7 @@ int main(void)
         cmocka_unit_test(a_part_begins_with_the_head),
         cmocka_unit_test(its_name_is_a_line),
         cmocka_unit_test(a_command_seeks_paces_and_loops),
+        cmocka_unit_test(a_command_is_seen_at_once),
         cmocka_unit_test(what_a_replay_refuses),
         cmocka_unit_test(a_new_round_begins_with_the_head),
 

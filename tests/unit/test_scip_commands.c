@@ -278,6 +278,22 @@ static void speed_is_reset(void **state)
     assert_int_equal(rig.n_lines, 0);
 }
 
+/* Another session controls the head. The stream goes on: its next scan comes. */
+static void a_refused_reset_changes_nothing(void **state)
+{
+    (void)state;
+    static const struct protocol_rig_reply taken[] = {
+        {"HEAD:LINES? DEF", "10", 0}, {"HEAD:LINES?", "9.1", 0}, {"HEAD:LINES ", "ERR -203", -203}, {NULL, NULL, 0}};
+    scip_open("URG-04LX");
+    rig.replies = taken;
+    scip_ask("MD0044004401000\n", "MD0044004401000\n00P\n\n");
+    protocol_rig_input(&rig, "RS\n");
+    assert_string_equal(rig.line[rig.n_lines - 1], "HEAD:LINES DEF");
+    scip_expect("RS\n10Q\n\n");
+    scip_turn(0);
+    assert_true(rig.len > 0);
+}
+
 static void reset_and_reboot(void **state)
 {
     (void)state;
@@ -398,6 +414,7 @@ int main(void)
         cmocka_unit_test(bit_rate),
         cmocka_unit_test(motor_speed),
         cmocka_unit_test(speed_is_reset),
+        cmocka_unit_test(a_refused_reset_changes_nothing),
         cmocka_unit_test(reset_and_reboot),
         cmocka_unit_test(a_reboot_begins_anew),
         cmocka_unit_test(a_client_that_goes_reboots_at_once),

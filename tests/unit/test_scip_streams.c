@@ -36,12 +36,16 @@ static void asked_while_it_stops(void **state)
 {
     (void)state;
     static const struct protocol_rig_reply stops[] = {{"HEAD:STATE?", "spin-down", 0}, {NULL, NULL, 0}},
-                                           idle[] = {{"HEAD:STATE?", "idle", 0}, {NULL, NULL, 0}};
+                                           idle[] = {{"HEAD:STATE?", "idle", 0}, {NULL, NULL, 0}},
+                                           scans[] = {{"HEAD:STATE?", "scanning", 0}, {NULL, NULL, 0}};
     scip_open("UTM-30LX");
     scip_turn(0);
     scip_ask("MD0000108001000\n", "MD0000108001000\n00P\n\n");
     assert_int_equal(rig.n_lines, 0);
     rig.replies = stops;
+    scip_turn(1); /* a scan that was made before the stop: no other follows it */
+    assert_true(rig.len > 3000);
+    protocol_rig_clear(&rig);
     rig.ops->time(rig.protocol, 900000000);
     rig.replies = idle;
     rig.ops->time(rig.protocol, 950000000);
@@ -49,9 +53,11 @@ static void asked_while_it_stops(void **state)
     rig.ops->time(rig.protocol, 1000000000);
     assert_int_equal(rig.n_lines, 3);
     assert_string_equal(rig.line[2], "SCAN:START");
-    /* The first scan has come. A stop after it is on purpose: the head is not started again. */
+    /* The head scans. A stop after that is on purpose: the head is not started again. */
+    rig.replies = scans;
     scip_turn(41);
     assert_true(rig.len > 3000);
+    rig.replies = idle;
     protocol_rig_clear(&rig);
     rig.ops->time(rig.protocol, 9000000000);
     assert_int_equal(rig.n_lines, 0);

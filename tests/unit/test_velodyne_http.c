@@ -104,6 +104,11 @@ static void test_settings(void **state)
         {"/cgi/setting/phaselock", "offset=110.00000000000001&offsetInput=1.1", 200, "HEAD:PHASE 1.10"}, /* 100 * 1.1 */
         {"/cgi/setting/phaselock", "enabled=1", 400, NULL},
         {"/cgi/setting/phaselock", "offset=0&offsetInput=360", 400, NULL},
+        {"/cgi/setting/phaselock", "offset=35999&offsetInput=359.99", 200, "HEAD:PHASE 359.99"},
+        {"/cgi/setting/phaselock", "offset=35999.00000000001", 200, "HEAD:PHASE 359.99"},
+        {"/cgi/setting/phaselock", "offset=35999.5", 400, NULL}, /* nearer to 36000, which is not allowed */
+        {"/cgi/setting/phaselock", "offset=35999.99", 400, NULL},
+        {"/cgi/setting/phaselock", "offset=0&offsetInput=359.995", 400, NULL},
         {"/cgi/setting/phaselock", "offset=36000", 400, NULL},
         {"/cgi/setting/phaselock", "offset=nan", 400, NULL},
         {"/cgi/save", "data=submit", 200, NULL},

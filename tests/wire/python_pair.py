@@ -19,8 +19,8 @@ def framed(kind, flags, length, payload, seq=0):
 def refused(function, *arguments):
     try:
         function(*arguments)
-    except scanhead.ScanheadError:
-        return
+    except scanhead.ScanheadError as error:
+        return str(error)
     assert False, f"{arguments} was taken"
 
 
@@ -34,6 +34,8 @@ def misuse(path):
     for source in ("tcp:127.0.0.1:65537", "tcp:127.0.0.1:0", "tcp:127.0.0.1:\xb2", "tcp:5025", "a\0b", "",
                    "tcp:" + 70 * "a" + ".b:1", "tty:" + path):
         refused(scanhead.open, source)
+    for address in ("::1:4000", "[::1]4000", "[::1", "[]:4000", ":4000", "[[::1]]:4000", "127.0.0.1:004000"):
+        assert "not an address" in refused(scanhead.open, "tcp:" + address), address  # as scanhead_open says
     os.mkfifo(path + ".fifo")
     for source in ("/", "/dev/zero", path + ".fifo"):
         refused(scanhead.open, source)

@@ -1090,13 +1090,22 @@ def _open_tty(path: str) -> int:
     return fd
 
 
+def _split_address(name: str, address: str) -> Tuple[str, int]:
+    """Splits HOST:PORT or [IPV6]:PORT, as scanhead_open does."""
+    host, _, port = address.rpartition(":")
+    is_ipv6 = host.startswith("[") and host.endswith("]")
+    if is_ipv6:
+        host = host[1:-1]
+    is_host = 1 <= len(host) <= 255 and "]" not in host and (is_ipv6 or not ("[" in host or ":" in host))
+    if not is_host or not (port.isascii() and port.isdigit() and len(port) <= 5 and 1 <= int(port) <= 65535):
+        raise ScanheadError(f"{name}: not an address; allowed are tcp:HOST:PORT or tcp:[IPV6]:PORT, port 1 to 65535")
+    return host, int(port)
+
+
 def _open_source(name: str, timeout_s: float) -> _Source:
     kind, _, rest = name.partition(":")
     if kind == "tcp":
-        host, _, port = rest.rpartition(":")
-        if not host or not (port.isascii() and port.isdigit() and 1 <= int(port) <= 65535):
-            raise ScanheadError(f"{name}: not tcp:HOST:PORT with a port of 1 to 65535")
-        connection = socket.create_connection((host.strip("[]"), int(port)), timeout_s)
+        connection = socket.create_connection(_split_address(name, rest), timeout_s)
         if connection.getsockname() == connection.getpeername():  # nobody listens, and the system chose the same port
             connection.close()
             raise ConnectionRefusedError(errno.ECONNREFUSED, os.strerror(errno.ECONNREFUSED))
