@@ -15,7 +15,7 @@ struct fd_link {
     int fd;
     int reported_opened, reported_closed;
     int ended;
-    char name[24];
+    char name[64];
 };
 
 static int fd_open(const struct link_spec *spec, void **link, struct sh_err *err)
@@ -29,6 +29,7 @@ static int fd_open(const struct link_spec *spec, void **link, struct sh_err *err
     if (self == NULL) return sh_fail(err, SH_ENOMEM, "link fd:%d: no memory", spec->fd);
     self->fd = spec->fd;
     snprintf(self->name, sizeof self->name, "fd:%d", spec->fd);
+    if (spec->path[0] != '\0') snprintf(self->name, sizeof self->name, "%.60s", spec->path);
     *link = self;
     return SH_OK;
 }

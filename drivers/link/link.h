@@ -28,7 +28,8 @@ struct link_memory; /* memory.h */
 
 struct link_spec {
     enum link_type type;
-    char path[256];     /* file: where to write; pty: symlink to the slave, may be empty; usb: see below */
+    char path[256];     /* file: where to write; pty: symlink to the slave, may be empty; usb: see below; fd: what
+                           its endpoint is called */
     char address[64];   /* tcp, udp, web: numeric or name; empty: 127.0.0.1 */
     int port;           /* tcp, web: 0 lets the system choose; udp: the receiver's */
     char interface[32]; /* udp: its name; needed for broadcasts and multicast. Empty: the system chooses */

@@ -43,6 +43,13 @@ static void on_signal(int number)
     errno = saved;
 }
 
+/* A terminal that closes sends the signal up to three times, and nobody waits who would want an end at once. */
+static void on_hangup(int number)
+{
+    (void)number;
+    atomic_store(&interrupted, 1);
+}
+
 int app_interrupted(void)
 {
     return atomic_load(&interrupted);
@@ -50,11 +57,14 @@ int app_interrupted(void)
 
 void app_catch_signals(void)
 {
-    struct sigaction action;
+    struct sigaction action, was;
     memset(&action, 0, sizeof action);
     action.sa_handler = on_signal; /* no SA_RESTART: waits end at once */
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
+    action.sa_handler = on_hangup;
+    if (sigaction(SIGHUP, NULL, &was) == 0 && was.sa_handler != SIG_IGN) /* `nohup` ignores it */
+        sigaction(SIGHUP, &action, NULL);
     signal(SIGPIPE, SIG_IGN);
     signal(SIGXFSZ, SIG_IGN); /* write() fails at a limit of file size, and the program goes on */
 }

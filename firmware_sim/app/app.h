@@ -74,7 +74,7 @@ int app_begin_messages(struct sh_err *err);
 void app_end_messages(void);
 
 /* Prints warnings and progress to standard error, each line with the program's name before it. Asks the work to stop
- * after SIGINT or SIGTERM (app_interrupted). */
+ * after SIGINT, SIGTERM or SIGHUP (app_interrupted). */
 extern const struct sh_report app_report_stderr;
 
 /* The same, but a line of progress a second at most: for work that reports every piece. */
@@ -91,9 +91,9 @@ void app_set_quiet(int quiet);
  * name, and each is printed. */
 void app_warn_of(const char *what);
 
-/* 1 after SIGINT or SIGTERM, once app_catch_signals was called: the command ends in good order. A second
- * signal within a second counts as the same one. A third, or one that comes later, ends the process at
- * once. */
+/* 1 after SIGINT, SIGTERM or SIGHUP, once app_catch_signals was called: the command ends in good order. A second SIGINT
+ * or SIGTERM within a second counts as the same one. A third, or one that comes later, ends the process at once. SIGHUP
+ * never does. SIGHUP stays ignored where the command was started so (`nohup`). */
 int app_interrupted(void);
 void app_catch_signals(void);
 

@@ -162,6 +162,7 @@ struct reader {
     size_t line_no;
     struct journal_entry *entry;
     size_t n, capacity;
+    size_t end_no; /* the line that has END; 0: none so far */
 };
 
 __attribute__((format(printf, 3, 4))) static int fail_line(const struct reader *reader, struct sh_err *err,
@@ -203,12 +204,18 @@ static int add_entry(struct reader *reader, struct sh_err *err)
             "%.20s commands are missing here, which could not be written in time; only a complete journal can be "
             "replayed",
             reader->text + sizeof lost_line - 1);
+    if (reader->end_no != 0)
+        return fail_line(reader, err,
+                         "stands after END of line %zu; a journal ends with END: move this line before it, or take END "
+                         "out",
+                         reader->end_no);
     if (reader->n == MAX_ENTRIES)
         return fail_line(reader, err, "too many commands; allowed up to %d in a journal", MAX_ENTRIES);
     if (!grow(&reader->entry, &reader->capacity, reader->n + 1, sizeof *reader->entry))
         return sh_fail(err, SH_ENOMEM, "journal: %s: no memory", reader->path);
     const char *wrong = parse_entry(reader->text, &reader->entry[reader->n]);
     if (wrong != NULL) return fail_line(reader, err, "%s; a line is <tick> <ns> <session> <command>", wrong);
+    if (journal_is_end(&reader->entry[reader->n])) reader->end_no = reader->line_no;
     reader->entry[reader->n++].line_no = (uint32_t)reader->line_no;
     return SH_OK;
 }
@@ -258,5 +265,20 @@ int journal_read(const char *path, struct journal_entry **entries, size_t *n, st
     if (reader.n > 1) qsort(reader.entry, reader.n, sizeof *reader.entry, journal_compare);
     *entries = reader.entry;
     *n = reader.n;
+    return SH_OK;
+}
+
+int journal_check_times(const char *path, const struct journal_entry *entries, size_t n, int64_t tick_ns,
+                        struct sh_err *err)
+{
+    for (size_t i = 0; i < n; i++) {
+        const struct journal_entry *e = &entries[i];
+        /* The product tick * tick_ns may overflow where the comparison says that all is well. */
+        if (((uint64_t)e->t_ns + (uint64_t)tick_ns - 1) / (uint64_t)tick_ns <= e->tick) continue;
+        return sh_fail(err, SH_EINPUT,
+                       "journal: %s:%" PRIu32 ": the device time %" PRId64 " ns is after the tick %" PRIu64
+                       "; allowed is 0 to %" PRIu64 " ns with this loop.tick_hz",
+                       path, e->line_no, e->t_ns, e->tick, e->tick * (uint64_t)tick_ns);
+    }
     return SH_OK;
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Frames that a reader lost: counted here (reader_lost_frames), and reported to the error queue. A reader of the native
- * stream gets an event of its own about them. Pulses that the head could not compute in time are in
+ * stream gets an event of its own about them. Losses of a part of this program, such as the page's observer, are no
+ * client's: only the counts of its link have them. Pulses that the head could not compute in time are in
  * device/overrun.c. */
 #include <stdio.h>
 #include <string.h>
@@ -8,18 +9,24 @@
 #include "drivers/protocol/native_encode.h"
 #include "firmware_sim/loop/pump_inside.h"
 
+static void count_lost_of_clients(struct pump *pump, uint64_t frames, uint64_t pulses)
+{
+    if (pump->is_own) return;
+    atomic_fetch_add(&pump->stream->counters->reader_lost_frames, frames);
+    atomic_fetch_add(&pump->stream->counters->reader_lost_pulses, pulses);
+}
+
 static void count_lost(struct pump *pump, uint32_t n, uint64_t pulses)
 {
     pump->counts.left_out_frames += n;
     pump->counts.left_out_pulses += pulses;
-    atomic_fetch_add(&pump->stream->counters->reader_lost_frames, n);
-    atomic_fetch_add(&pump->stream->counters->reader_lost_pulses, pulses);
+    count_lost_of_clients(pump, n, pulses);
 }
 
 /* Reports a loss of the session to the error queue; the next one only after its reader has caught up. */
 static void lost_frames_report(struct pump *pump, struct session *s)
 {
-    if (!s->lost.lagging) {
+    if (!s->lost.lagging && !pump->is_own) {
         char text[96];
         snprintf(text, sizeof text, "session %u, %.50s", s->id, s->peer);
         source_report(pump->links->source, CMD_E_READER, text);
@@ -30,7 +37,7 @@ static void lost_frames_report(struct pump *pump, struct session *s)
 void session_count_units(struct pump *pump, struct session *s, uint64_t n)
 {
     pump->counts.lost_units += n;
-    atomic_fetch_add(&pump->stream->counters->reader_lost_frames, n);
+    count_lost_of_clients(pump, n, 0);
     lost_frames_report(pump, s);
 }
 

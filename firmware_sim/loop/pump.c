@@ -78,7 +78,8 @@ int pump_open(struct links *links, uint32_t index, const struct link_spec *spec,
     pump->links = links;
     pump->index = index;
     pump->stream = links->stream;
-    pump->is_clean = spec->type == LINK_FD || spec->type == LINK_MEMORY || spec->clean;
+    pump->is_own = spec->type == LINK_FD || spec->type == LINK_MEMORY;
+    pump->is_clean = pump->is_own || spec->clean;
     pump->can_unplug = (link_faults(spec) & LINK_FAULT_BIT(LINK_FAULT_UNPLUG)) != 0;
     pump->protocol = protocol_ops_get((enum protocol_id)spec->protocol);
     pump->dialect = spec->dialect;

@@ -82,6 +82,7 @@ struct pump {
     uint32_t n_told, told[MAX_TOLD]; /* checksums of the lines that the user got from a protocol */
     uint32_t out_cap;                /* of each session */
     int holds;                       /* its readers hold back the paces fast and step */
+    int is_own;                      /* its reader is a part of this program */
     int is_clean;                    /* its readers see nothing of faults, power cycles included */
     int can_unplug;                  /* its endpoint goes when power goes */
     uint32_t power_seen;             /* changes of power that were done here */

@@ -108,14 +108,17 @@ void replay_open_commands(struct replay *r)
     cmd->limits.n_stations = 1;
 }
 
-/* The recording is played from another time on, at another speed, or with another loop. */
+/* The recording is played from another time on, at another speed, or with another loop. The last command decides: a
+ * seek takes back a stop that no tick has carried out yet. Without the loop a round that has not begun is dropped. */
 static void replay_change(struct replay *r, const struct command_replay_change *to)
 {
     if (to->position_s >= 0.0) {
         r->seek_s = to->position_s;
         r->wants_seek = 1;
+        r->wants_stop = 0;
     }
     if (to->loop >= 0) r->loop = to->loop;
+    if (!r->loop) r->wants_again = 0;
     if (to->speed < 0.0) return;
     r->speed_changed |= to->speed != r->speed;
     r->speed = to->speed;

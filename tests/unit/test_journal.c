@@ -90,6 +90,64 @@ static void the_format_is_as_documented(void **ctx)
     free(out);
 }
 
+static void expect_unreadable(const char *text, size_t len, const char *why)
+{
+    struct sh_err err = {0};
+    struct journal_entry *out;
+    size_t n;
+    write_text(text, len);
+    assert_int_equal(journal_read(path, &out, &n, &err), SH_EINPUT);
+    if (strstr(err.text, why) == NULL) fail_msg("%s, not '%s'", err.text, why);
+    assert_null(strchr(err.text, '\n'));
+}
+
+/* Remarks may follow the end; commands and another end are refused, also those of earlier ticks. */
+static void nothing_stands_after_the_end(void **ctx)
+{
+    (void)ctx;
+    static const char *const after[] = {"500 500 1 SCAN:STAR", "300 300 1 SCAN:STAR", "400 400 0 END"};
+    static const char ended[] = "# scanhead journal 1\n600 600 1 *RST\n400 400 0 END\n# a remark\n\n";
+    char text[256];
+    struct journal_entry *out;
+    size_t n;
+    write_text(ended, sizeof ended - 1);
+    assert_int_equal(journal_read(path, &out, &n, NULL), 0);
+    assert_true(n == 2 && journal_is_end(&out[0])); /* a head that ends still answers: such a line comes before END */
+    free(out);
+    for (size_t i = 0; i < sizeof after / sizeof *after; i++) {
+        const int len = snprintf(text, sizeof text, "%s%s\n", ended, after[i]);
+        expect_unreadable(text, (size_t)len, "j.txt:6: stands after END of line 3");
+    }
+}
+
+/* Ticks of 1 ms: a client had seen at most the time at which its command's tick begins. */
+static void no_time_is_after_its_tick(void **ctx)
+{
+    (void)ctx;
+    static const struct {
+        uint64_t tick;
+        int64_t t_ns;
+        int rc;
+    } rows[] = {{0, 0, SH_OK},
+                {0, 1, SH_EINPUT},
+                {400, 400000000, SH_OK},
+                {400, 400000001, SH_EINPUT},
+                {400, 0, SH_OK}, /* the client was slow */
+                {UINT64_MAX, INT64_MAX, SH_OK},
+                {9223372036854, INT64_MAX, SH_EINPUT}, /* 2^63 ns are 9,223,372,036,854.8 ms */
+                {9223372036855, INT64_MAX, SH_OK}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct sh_err err = {0};
+        const struct journal_entry entries[] = {
+            {.tick = 1, .line_no = 2},
+            {.tick = rows[i].tick, .t_ns = rows[i].t_ns, .line_no = 7},
+        };
+        if (journal_check_times("j.txt", entries, 2, 1000000, &err) != rows[i].rc) fail_msg("row %zu", i);
+        assert_int_equal(strncmp(err.text, "journal: j.txt:7: ", 18) == 0, rows[i].rc != SH_OK);
+        if (i == 3) assert_non_null(strstr(err.text, "allowed is 0 to 400000000 ns"));
+    }
+}
+
 static void sorted_by_tick_and_else_as_in_the_file(void **ctx)
 {
     (void)ctx;
@@ -150,17 +208,6 @@ static void malformed_lines_are_named(void **ctx)
         if (strstr(err.text, place) == NULL || strstr(err.text, cases[i].why) == NULL)
             fail_msg("'%s': %s", cases[i].line, err.text);
     }
-}
-
-static void expect_unreadable(const char *text, size_t len, const char *why)
-{
-    struct sh_err err = {0};
-    struct journal_entry *out;
-    size_t n;
-    write_text(text, len);
-    assert_int_equal(journal_read(path, &out, &n, &err), SH_EINPUT);
-    if (strstr(err.text, why) == NULL) fail_msg("%s, not '%s'", err.text, why);
-    assert_null(strchr(err.text, '\n'));
 }
 
 static void what_is_no_journal_is_refused(void **ctx)
@@ -334,6 +381,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_written_is_read),
         cmocka_unit_test(the_format_is_as_documented),
+        cmocka_unit_test(nothing_stands_after_the_end),
+        cmocka_unit_test(no_time_is_after_its_tick),
         cmocka_unit_test(sorted_by_tick_and_else_as_in_the_file),
         cmocka_unit_test(malformed_lines_are_named),
         cmocka_unit_test(what_is_no_journal_is_refused),

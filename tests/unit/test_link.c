@@ -236,7 +236,11 @@ static void test_fd(void **state)
     bench_close(&bench);
     assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair), 0);
     spec.fd = pair[0];
+    snprintf(spec.path, sizeof spec.path, "the observer");
     bench = bench_open(&spec); /* ended from this side: written bytes are sent before */
+    char name[64];
+    bench.ops->endpoint(bench.link, name, sizeof name);
+    assert_string_equal(name, "the observer");
     bench_expect(&bench, LINK_OPENED, 0);
     bench_write_all(&bench, 0, "last", 4);
     bench.ops->end(bench.link, 0);

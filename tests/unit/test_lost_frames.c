@@ -147,12 +147,30 @@ static void lost_units_are_counted(void **state)
     assert_int_equal(pump.counts.left_out_frames, 0);
 }
 
+/* A part of this program loses frames, such as the page's observer. The head's clients miss nothing. So the loss is in
+ * the counts of the link, and the reader is told of it, but neither the head's sums nor its errors have it. */
+static void own_losses_are_no_clients(void **state)
+{
+    (void)state;
+    struct session *s = &pump.session[1];
+    static uint8_t buf[REPLY_ROOM];
+    pump.is_own = 1;
+    atomic_store(&stream.ring.released, 500);
+    assert_int_equal(read_pulses(s, buf, 40, 1000, 10), 0);
+    assert_int_equal(read_pulses(s, buf, 48, 1080, 10), 7);
+    expect_loss(buf, 7, 70, 7, "7 frames lost: the reader is too slow");
+    session_count_units(&pump, s, 3);
+    assert_true(pump.counts.left_out_frames == 7 && pump.counts.left_out_pulses == 70 && pump.counts.lost_units == 3);
+    assert_true(counters.reader_lost_frames == 0 && counters.reader_lost_pulses == 0 && n_reports == 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(each_episode_is_reported_once, open_stream, close_stream),
         cmocka_unit_test_setup_teardown(a_loss_is_announced_and_counted, open_stream, close_stream),
         cmocka_unit_test_setup_teardown(lost_units_are_counted, open_stream, close_stream),
+        cmocka_unit_test_setup_teardown(own_losses_are_no_clients, open_stream, close_stream),
     };
     return cmocka_run_group_tests_name("lost frames", tests, NULL, NULL);
 }

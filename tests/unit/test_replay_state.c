@@ -256,6 +256,53 @@ static void a_command_is_seen_at_once(void **state)
     free(cfg);
 }
 
+/* Two commands between two ticks do what they would do with a tick between them. */
+static void the_last_of_two_commands_decides(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *line[2], *events, *next;
+        int is_over; /* the last frame was sent before, and a loop is to begin anew */
+    } rows[] = {{{"SCAN:STOP", "SCAN:REPL 0.012"}, "D 12 ", "13 ", 0},
+                {{"*RST", "SCAN:REPL 0.012"}, "D 12 ", "13 ", 0},
+                {{"SCAN:STOP", "SCAN:STAR"}, "0 ", "1 ", 0},
+                {{"SCAN:REPL 0.012", "SCAN:STAR"}, "0 ", "1 ", 0},
+                {{"SCAN:REPL 0.012", "SCAN:REPL 0.003"}, "D 3 ", "4 ", 0},
+                {{"SCAN:STAR", "SCAN:REPL 0.012"}, "D 12 ", "13 ", 0},
+                {{"SCAN:REPL 0.012", "SCAN:STOP"}, "", "", 0},
+                {{"SCAN:REPL 0.012", "*RST"}, "", "", 0},
+                {{"SCAN:STAR", "SCAN:STOP"}, "", "", 0},
+                {{"SCAN:STOP", "SCAN:REPL ,2"}, "", "", 0}, /* without a time it starts nothing */
+                {{"SCAN:REPL ,0", "SCAN:STAR"}, "", "", 0}, /* it is paused */
+                {{"SCAN:REPL ,0", "SCAN:REPL ,1"}, "2 ", "3 ", 0},
+                {{"SCAN:REPL ,2", "SCAN:STOP"}, "", "", 0},
+                {{"SCAN:STOP", "SCAN:REPL 0.012"}, "D 12 ", "13 ", 1},
+                {{"SCAN:REPL 0.012", "SCAN:STOP"}, "", "", 1},
+                {{"SCAN:REPL ,2", "SCAN:STOP"}, "", "", 1},
+                {{"SCAN:REPL ,2", "SCAN:REPL ,,OFF"}, "", "", 1},
+                {{"SCAN:REPL ,,OFF", "SCAN:REPL ,,ON"}, "", "", 1}, /* the loop was off: it is over */
+                {{"SCAN:REPL ,1", "SCAN:REPL ,,ON"}, "0 ", "1 ", 1}};
+    struct config *cfg = config_new();
+    event_recording_write(file_path, 20);
+    const struct replay_options options = {.path = file_path, .speed = 1};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct replay *r = open_replay(cfg, &options);
+        assert_string_equal(said(r, rows[i].is_over ? "SCAN:REPL 0.018,1,ON" : "SCAN:REPL 0,1,ON"), "OK");
+        assert_string_equal(tick_of_replay(r, 0), rows[i].is_over ? "D 18 " : "0 ");
+        assert_string_equal(tick_of_replay(r, 1), rows[i].is_over ? "19 " : "1 ");
+        for (int k = 0; k < 2; k++)
+            assert_string_equal(said(r, rows[i].line[k]), "OK");
+        for (uint64_t k = 0; k < 2; k++) {
+            const char *events = tick_of_replay(r, 2 + k), *wanted = k == 0 ? rows[i].events : rows[i].next;
+            if (strcmp(events, wanted) != 0)
+                fail_msg("row %zu, %s then %s: '%s', wanted '%s'", i, rows[i].line[0], rows[i].line[1], events, wanted);
+        }
+        assert_string_equal(said(r, "SYST:ERR:COUN?"), "0");
+        replay_free(r);
+    }
+    free(cfg);
+}
+
 /* A part ends 0.5 ms after its last frame. A seek to a time between these two goes to the end, where a loop begins
  * anew. */
 static void a_seek_to_the_end_of_a_part_is_its_end(void **state)
@@ -328,16 +375,11 @@ static void what_a_replay_refuses(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(frames_go_out_in_their_ticks),
-        cmocka_unit_test(each_time_has_its_numbers),
-        cmocka_unit_test(a_part_begins_with_the_head),
-        cmocka_unit_test(its_name_is_a_line),
-        cmocka_unit_test(a_command_seeks_paces_and_loops),
-        cmocka_unit_test(a_command_is_seen_at_once),
-        cmocka_unit_test(what_a_replay_refuses),
-        cmocka_unit_test(a_new_round_begins_with_the_head),
-
-        cmocka_unit_test(a_seek_to_the_end_of_a_part_is_its_end),
+        cmocka_unit_test(frames_go_out_in_their_ticks),     cmocka_unit_test(each_time_has_its_numbers),
+        cmocka_unit_test(a_part_begins_with_the_head),      cmocka_unit_test(its_name_is_a_line),
+        cmocka_unit_test(a_command_seeks_paces_and_loops),  cmocka_unit_test(a_command_is_seen_at_once),
+        cmocka_unit_test(the_last_of_two_commands_decides), cmocka_unit_test(what_a_replay_refuses),
+        cmocka_unit_test(a_new_round_begins_with_the_head), cmocka_unit_test(a_seek_to_the_end_of_a_part_is_its_end),
     };
     return cmocka_run_group_tests_name("replay state", tests, make_file, remove_file);
 }

@@ -250,8 +250,9 @@ static const struct app_option OPTIONS[] = {
 /* clang-format on */
 
 static const char NOTES[] =
-    "Ctrl-C, or SIGTERM, ends the head with all files complete. A second signal within a second counts as the same\n"
-    "one. A third signal ends the head at once, and so does a second one that comes after more than a second.\n"
+    "Ctrl-C or SIGTERM ends the head with all files complete, and so does SIGHUP from a terminal that closes. A\n"
+    "second Ctrl-C or SIGTERM within a second counts as the same one. A third ends the head at once, and so does a\n"
+    "second one after more than a second. Under nohup, SIGHUP stays ignored.\n"
     "\n"
     "As a service (systemd, Type=notify) it sends READY=1 to $NOTIFY_SOCKET once all links are open, and STOPPING=1\n"
     "when its end begins.\n"

@@ -25,6 +25,7 @@ int offline_connect(const char *who, struct link_spec *link, struct scanhead **s
     char source[32], why[256];
     link->type = LINK_FD;
     link->fd = -1;
+    snprintf(link->path, sizeof link->path, "%s", who);
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, fd) != 0)
         return sh_fail(err, SH_EIO, "socket pair: %s", strerror(errno));
     snprintf(source, sizeof source, "fd:%d", fd[1]);

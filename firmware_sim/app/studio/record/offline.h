@@ -48,7 +48,7 @@ void offline_close(struct offline *offline);
 
 /* Joins a client that has a thread of its own to a head in this process. link becomes the head's end of a socket pair,
  * and has to be one of the head's links. Returns the client's descriptor, which belongs to the handle; or an error, and
- * link->fd is -1. who: for errors. */
+ * link->fd is -1. who: for errors, and the link's endpoint. */
 int offline_connect(const char *who, struct link_spec *link, struct scanhead **sh, struct sh_err *err);
 
 #endif

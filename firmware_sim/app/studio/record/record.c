@@ -426,8 +426,9 @@ static const char HELP_NOTES[] =
     "FILE.part, for --repair, with FILE.grid beside a .ptx, and waveforms in X.wdp.part beside X.las. A recorder\n"
     "does not begin while one of these exists.\n"
     "\n"
-    "Ctrl-C, or SIGTERM, ends a recording with complete files. A second signal within a second counts as the same\n"
-    "one. A third signal ends the recording at once, and so does a second one after more than a second.\n";
+    "Ctrl-C or SIGTERM ends a recording with complete files, and so does SIGHUP from a terminal that closes. A\n"
+    "second Ctrl-C or SIGTERM within a second counts as the same one. A third ends the recording at once, and so\n"
+    "does a second one after more than a second. Under nohup, SIGHUP stays ignored.\n";
 
 const struct app_command app_record = {
     .name = "record",

@@ -123,7 +123,7 @@ static const char NOTES[] =
     "FILE is a recording: .shs or .pcapng (points, and the mesh of each scan's grid), .ply or .las (points). The\n"
     "address of its page is printed to standard output once the file is read. Open it in a browser.\n"
     "\n"
-    "Ctrl-C, or SIGTERM, ends it with exit status 0.\n";
+    "Ctrl-C, SIGTERM, or SIGHUP from a terminal that closes, ends it with exit status 0.\n";
 
 const struct app_command app_view = {
     .name = "view",

@@ -98,7 +98,7 @@ static int open_watch(const struct config *cfg, const struct site *site, const s
     if (rc == SH_OK) rc = watch_seen_open(w, err);
     if (rc == SH_OK) rc = open_preview(w, err);
     w->link.waits = options->waits ? LINK_WAITS_YES : LINK_WAITS_NO;
-    if (rc == SH_OK) w->fd = offline_connect("the observer", &w->link, &w->sh, err);
+    if (rc == SH_OK) w->fd = offline_connect("the page's observer", &w->link, &w->sh, err);
     if (rc == SH_OK && w->fd < 0) rc = w->fd;
     w->shown_share = w->seen.coverage != NULL ? 0.0 : (double)NAN;
     if (rc == SH_OK) return SH_OK;
