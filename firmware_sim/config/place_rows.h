@@ -60,7 +60,8 @@
     {"scene.target.objects", .type = CFG_LIST, .min = 0, .max = CONFIG_MAX_OBJECTS,
      LIST_OF(scene.target.object, scene.target.n_objects), .help = "Objects by name."},
     {"scene.target.objects[]", 0, SCENE_NAME_LEN, CFG_TEXT, .def = "", .example = "Wall*",
-     .help = "Name; * and ? are wildcards, as in a shell. It must fit an object."},
+     .help = "Name, which must fit an object. * stands for any characters and ? for one; \\* and \\? are the "
+             "characters themselves."},
     {KEY(scene.target.others), CFG_ENUM, .def = "left_out",
      WORDS([OTHERS_LEFT_OUT] = "left_out", [OTHERS_HIDE] = "hide"),
      .help = "All other objects. left_out: they are not part of the scene, so they give no points and hide nothing; "
