@@ -163,7 +163,8 @@
     {KEY(platform.waypoints), CFG_PATH, .def = "", .example = "way.csv",
      .of = ON_PATH,
      .help = "trajectory, stops: CSV with x_m,y_m,z_m,speed_m_s[,pause_s] in place of file. The heading follows the "
-             "path. The platform is level, like a station there with pitch and roll 0."},
+             "path. The platform is level, like a station there with pitch and roll 0. The path is a smooth curve, and "
+             "speed_m_s the straight distance to the next point per time."},
     {KEY(platform.start_s), CFG_REAL, "s", "0", 0, 1e9, .of = ON_PATH,
      .help = "trajectory, stops: start of a scan, or the first stop, on the trajectory: seconds after its first "
              "sample."},
