@@ -36,7 +36,7 @@ enum { PLAN_MAX_OPTIONS = 12 };
 struct plan_row {
     char stage[16], method[32];
     double error_m, echo_share, cost_ns; /* as in struct plan_option */
-    char why[192];
+    char why[224];
     int forced; /* the configuration says so, not the plan */
     uint32_t n_left;
     struct plan_option left[PLAN_MAX_OPTIONS]; /* the options left out; why_not says why */

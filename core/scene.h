@@ -80,6 +80,10 @@ struct scene_mesh_spec {
  * between two characters of UTF-8, and ends in a hash of all its bytes. */
 int scene_copy_name(char *out, size_t room, const char *name, size_t n);
 
+/* Returns whether a whole name fits a pattern of a configuration: * stands for any characters, also none, and ? for one
+ * character of UTF-8. \* and \? stand for * and ?. All other characters stand for themselves, also [ ] and \. */
+int scene_name_fits(const char *pattern, const char *name);
+
 /* Which of a surface's triangles have colours at their corners. */
 enum scene_vertex_colours { SCENE_COLOURS_NONE, SCENE_COLOURS_SOME, SCENE_COLOURS_ALL };
 

@@ -35,12 +35,12 @@ struct surface {
     double glass, mirror;   /* shares of the power that are passed on, or reflected as by a mirror; 0..1 */
 };
 
-/* A configuration's rule for surfaces whose names fit. The patterns are those of the shell (fnmatch); NaN:
- * not said, and left unchanged. */
+/* A configuration's rule for surfaces whose names fit (scene_name_fits). NaN: not said, and left unchanged. */
 struct surface_rule {
     char object[SCENE_NAME_LEN], material[SCENE_NAME_LEN];
     struct surface surface;
 };
+int surface_rule_fits(const struct surface_rule *rule, const struct scene_surface *named);
 
 /* Surfaces by label. Entry n stands for no surface at all: nothing comes back. */
 struct surface_texture;

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "core/surface.h"
 
-#include <fnmatch.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -33,6 +32,11 @@ double surface_luminance(const float rgb[3])
            0.0722 * colour_srgb_decode((double)rgb[2]);
 }
 
+int surface_rule_fits(const struct surface_rule *rule, const struct scene_surface *named)
+{
+    return scene_name_fits(rule->object, named->object) && scene_name_fits(rule->material, named->material);
+}
+
 int surface_table_set(struct surface_table *table, uint32_t label, const struct scene_surface *named,
                       const struct surface_rule *rule, uint32_t n_rules, double unknown)
 {
@@ -40,8 +44,7 @@ int surface_table_set(struct surface_table *table, uint32_t label, const struct 
     int found = -1;
     *s = (struct surface){.reflectance = named->has_colour ? surface_luminance(named->colour) : unknown};
     for (uint32_t i = 0; i < n_rules && found < 0; i++)
-        if (fnmatch(rule[i].object, named->object, 0) == 0 && fnmatch(rule[i].material, named->material, 0) == 0)
-            found = (int)i;
+        if (surface_rule_fits(&rule[i], named)) found = (int)i;
     if (found >= 0) {
         double field[FIELDS], said[FIELDS];
         memcpy(field, s, sizeof field);

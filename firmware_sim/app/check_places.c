@@ -72,21 +72,21 @@ static void print_utm(const struct locate_grid *utm, double height_m, FILE *out)
 }
 
 /* The error of a level range in a scene whose coordinates are a grid's. The error comes from the grid's scale and
- * from the height above the ellipsoid, and is taken from two points 100 grid metres apart. */
-static int print_grid_ranges(const struct site *site, const double p_prcs[3], FILE *out, struct sh_err *err)
+ * from the height above the ellipsoid, and is taken from two points 100 grid metres apart. The line is left out at the
+ * very edge of what the grid reaches, where one of the points is beyond it. */
+static void print_grid_ranges(const struct site *site, const double p_prcs[3], FILE *out)
 {
     double p_ecef[2][3];
+    struct sh_err beyond;
     for (int i = 0; i < 2; i++) {
         const double p[3] = {p_prcs[0] + (i == 0 ? -50.0 : 50.0), p_prcs[1], p_prcs[2]};
         struct georef_place at;
-        int rc = geoframe_locate(&site->anchor.frame, p, &at, err);
-        if (rc != SH_OK) return rc;
+        if (geoframe_locate(&site->anchor.frame, p, &at, &beyond) != SH_OK) return;
         georef_geodetic_to_ecef(&at, p_ecef[i]);
     }
     double error = 100.0 / vec3_distance(p_ecef[1], p_ecef[0]) - 1.0, range_m = site->cfg->profile.range_max_m;
     fprintf(out, "            ranges are grid lengths: a level one of %g m reads %+.4f m (%+.1f ppm)\n", range_m,
             range_m * error, 1e6 * error);
-    return SH_OK;
 }
 
 static int print_on_earth(const struct site *site, uint32_t i, FILE *out, struct sh_err *err)
@@ -110,7 +110,7 @@ static int print_on_earth(const struct site *site, uint32_t i, FILE *out, struct
     fprintf(out, "  geodetic  lat %.9f lon %.9f deg, height %.4f m\n", at->place.lat_deg, at->place.lon_deg,
             at->place.height_m);
     print_utm(&utm, at->place.height_m, out);
-    if (grid) rc = print_grid_ranges(site, at->position_m, out, err);
+    if (grid) print_grid_ranges(site, at->position_m, out);
     fprintf(out, "  ecef      %.4f %.4f %.4f m\n", p_ecef[0], p_ecef[1], p_ecef[2]);
     double azimuth_deg = angle_deg(atan2(forward[0], forward[1])),
            off_plumb_deg = angle_deg(atan2(hypot(up[0], up[1]), up[2]));

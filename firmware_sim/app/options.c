@@ -68,8 +68,9 @@ static int parse_number(const struct app_command *command, const struct app_opti
     char *end;
     const int whole = row->kind != APP_NUMBER;
     *out = strtod(text, &end);
-    if (end != text && *end == '\0' && !isspace((unsigned char)text[0]) && *out >= row->min && *out <= row->max &&
-        (!whole || *out == floor(*out)))
+    const int is_decimal = strcspn(text, "xX") >= (size_t)(end - text); /* strtod reads 0x10, too */
+    if (end != text && is_decimal && *end == '\0' && !isspace((unsigned char)text[0]) && *out >= row->min &&
+        *out <= row->max && (!whole || *out == floor(*out)))
         return APP_OK;
     return app_usage(command, "--%s %s: not a %s from %.10g to %.10g", row->name, text,
                      whole ? "whole number" : "number", row->min, row->max);
@@ -91,6 +92,7 @@ int app_read_numbers(const char *text, char between, double *out, int n)
         char *end;
         out[i] = strtod(text, &end);
         if (end == text || !isfinite(out[i]) || *end != (i < n - 1 ? between : '\0')) return 0;
+        if (strcspn(text, "xX") < (size_t)(end - text)) return 0; /* 0x10 */
         text = end + 1;
     }
     return 1;

@@ -150,7 +150,7 @@ void app_pass_options(struct app_option *rows, const struct app_command *other, 
  * name of the word's option, without the dashes. */
 int app_find_word(const char *option, const char *word, const char *const *words, size_t n, struct sh_err *err);
 
-/* Reads n finite numbers with `between` between them, and nothing else. 0: the text is not that. */
+/* Reads n finite decimal numbers with `between` between them, and nothing else. 0: the text is not that. */
 int app_read_numbers(const char *text, char between, double *out, int n);
 
 /* Prints a usage error: one line that ends with where the help is. Returns APP_USAGE. */

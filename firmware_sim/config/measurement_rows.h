@@ -134,7 +134,8 @@
      .help = "Properties of surfaces, by name. The first entry that fits counts; members that it leaves out have "
              "their defaults."},
     {"surfaces[]", .type = CFG_MAP, .help = "An entry."},
-    {RULE(material), CFG_TEXT, .def = "*", .help = "Material's name; * and ? are wildcards, as in a shell."},
+    {RULE(material), CFG_TEXT, .def = "*",
+     .help = "Material's name. * stands for any characters and ? for one; \\* and \\? are the characters themselves."},
     {RULE(object), CFG_TEXT, .def = "*", .help = "Object's name, with the same wildcards."},
     {SURFACE(reflectance), CFG_REAL, NULL, "", 0, 1, .example = "0.4",
      .help = "Lambertian reflectance; 0 absorbs. When not given: luminance of the mesh's texture or colour."},

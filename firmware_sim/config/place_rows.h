@@ -60,7 +60,8 @@
     {"scene.target.objects", .type = CFG_LIST, .min = 0, .max = CONFIG_MAX_OBJECTS,
      LIST_OF(scene.target.object, scene.target.n_objects), .help = "Objects by name."},
     {"scene.target.objects[]", 0, SCENE_NAME_LEN, CFG_TEXT, .def = "", .example = "Wall*",
-     .help = "Name; * and ? are wildcards, as in a shell. It must fit an object."},
+     .help = "Name, which must fit an object. * stands for any characters and ? for one; \\* and \\? are the "
+             "characters themselves."},
     {KEY(scene.target.others), CFG_ENUM, .def = "left_out",
      WORDS([OTHERS_LEFT_OUT] = "left_out", [OTHERS_HIDE] = "hide"),
      .help = "All other objects. left_out: they are not part of the scene, so they give no points and hide nothing; "
@@ -92,7 +93,8 @@
     {"stations", .type = CFG_LIST, .min = 1, .max = CONFIG_MAX_STATIONS, LIST_OF(station, n_stations),
      .help = "Places where the head can stand."},
     {"stations[]", .type = CFG_MAP, .help = "A station."},
-    {STATION(name), CFG_TEXT, .def = "", .example = "gate", .help = "Name; station-N when not given."},
+    {"stations[].name", offsetof(struct config_station, name), CONFIG_NAME_LEN, CFG_TEXT, .def = "",
+     .example = "gate", .help = "Name; station-N when not given."},
     {STATION(position_m), CFG_VEC3, "m", "", -1e9, 1e9, .example = "[0, 0, 1.7]", .flags = CFG_NEEDED,
      .help = "The head's origin in the scene frame. Required, unless scene.anchor gives it from a place on Earth."},
     {STATION(instrument_height_m), CFG_REAL, "m", "", 0, 1000, .example = "1.7",
@@ -161,7 +163,8 @@
     {KEY(platform.waypoints), CFG_PATH, .def = "", .example = "way.csv",
      .of = ON_PATH,
      .help = "trajectory, stops: CSV with x_m,y_m,z_m,speed_m_s[,pause_s] in place of file. The heading follows the "
-             "path. The platform is level, like a station there with pitch and roll 0."},
+             "path. The platform is level, like a station there with pitch and roll 0. The path is a smooth curve, and "
+             "speed_m_s the straight distance to the next point per time."},
     {KEY(platform.start_s), CFG_REAL, "s", "0", 0, 1e9, .of = ON_PATH,
      .help = "trajectory, stops: start of a scan, or the first stop, on the trajectory: seconds after its first "
              "sample."},

@@ -57,8 +57,13 @@ struct config_tripod {
     double leg_diameter_m, legs_heading_deg;
 };
 
+enum {
+    CONFIG_NAME_LEN = 32,        /* room of the name that a configuration gives to a station */
+    CONFIG_STATION_NAME_LEN = 64 /* the same, with " frame N" after it, as stops at stations have it */
+};
+
 struct config_station {
-    char name[32];
+    char name[CONFIG_STATION_NAME_LEN];
     double position_m[3];                    /* of the head's origin in the scene frame; with instrument_height_m only
                                               * of a point above the floor */
     int has_position;                        /* 0: it follows from the place on the Earth, through the anchor */

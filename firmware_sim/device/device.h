@@ -22,6 +22,7 @@
 #include "drivers/protocol/native.h"
 #include "drivers/protocol/protocol.h"
 #include "firmware_sim/command/command.h"
+#include "firmware_sim/config/places.h"
 #include "firmware_sim/device/journal.h"
 #include "firmware_sim/device/settings_file.h"
 #include "firmware_sim/fault/board.h"
@@ -186,7 +187,7 @@ void device_finish_move(struct device *device, uint64_t released, struct command
 
 /* The present places of the stations. Any thread. */
 struct device_station {
-    char name[32];
+    char name[CONFIG_STATION_NAME_LEN];
     struct site_place place;
     int served;                        /* 0: it has another scanner */
     int has_tripod;                    /* else the rest is 0 */

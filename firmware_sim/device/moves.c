@@ -289,7 +289,7 @@ void device_get_station(struct device *device, uint32_t station, struct device_s
     const struct site *site = device_hold_site(device, &version);
     const struct site_tripod *t = &site->station[station].tripod;
     memset(out, 0, sizeof *out);
-    memcpy(out->name, site->station[station].station->name, sizeof out->name);
+    snprintf(out->name, sizeof out->name, "%s", site->station[station].station->name);
     site_get_place(site, station, &out->place);
     out->served = site_serves(site, station);
     out->has_tripod = t->from != NULL && out->served;

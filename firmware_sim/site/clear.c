@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* Surfaces that their file calls transparent, and the rules that would make glass of them. */
-#include <fnmatch.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -14,13 +13,12 @@ static const double MOST_GLASS = 0.9;
 static int is_decided(const struct scene_surface *s, const struct surface_rule *rule, uint32_t n)
 {
     for (uint32_t i = 0; i < n; i++)
-        if (fnmatch(rule[i].object, s->object, 0) == 0 && fnmatch(rule[i].material, s->material, 0) == 0)
-            return !isnan(rule[i].surface.glass) || !isnan(rule[i].surface.mirror);
+        if (surface_rule_fits(&rule[i], s)) return !isnan(rule[i].surface.glass) || !isnan(rule[i].surface.mirror);
     return 0;
 }
 
-/* A byte becomes up to four: a control character is written as \xNN. A backslash is doubled for fnmatch, and both are
- * doubled again for YAML. */
+/* A byte becomes up to four: a control character is written as \xNN. A wildcard has a backslash before it, which
+ * is doubled for YAML. */
 enum { NAME_ROOM = 4 * SCENE_NAME_LEN };
 
 /* Writes a pattern that fits this name alone, as a double-quoted scalar of YAML. */
@@ -30,7 +28,7 @@ static void quote(const char *name, char out[NAME_ROOM])
     out[n++] = '"';
     for (const char *p = name; *p != '\0'; p++) {
         const unsigned char c = (unsigned char)*p;
-        if (strchr("*?[\\", *p) != NULL) n += (size_t)snprintf(out + n, NAME_ROOM - n, "\\\\"); /* of fnmatch */
+        if (*p == '*' || *p == '?') n += (size_t)snprintf(out + n, NAME_ROOM - n, "\\\\"); /* scene_name_fits */
         if (*p == '"' || *p == '\\') out[n++] = '\\';
         if (c < 0x20 || c == 0x7f)
             n += (size_t)snprintf(out + n, NAME_ROOM - n, "\\x%02x", c);

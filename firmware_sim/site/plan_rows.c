@@ -15,7 +15,7 @@
 static void name_row(struct plan_row *row, const char *whose)
 {
     char why[sizeof row->why];
-    snprintf(why, sizeof why, "%.60s: %.125s", whose, row->why);
+    snprintf(why, sizeof why, "%.68s: %.150s", whose, row->why);
     memcpy(row->why, why, sizeof row->why);
 }
 
@@ -35,8 +35,8 @@ static void add_georef(const struct site *site, struct site_plan *plan)
         return;
     }
     for (uint32_t i = 0; i < site->n_stations; i++) {
-        char whose[64];
-        snprintf(whose, sizeof whose, "station %u %.40s", i + 1, s[i].station->name);
+        char whose[CONFIG_STATION_NAME_LEN + 24];
+        snprintf(whose, sizeof whose, "station %u %s", i + 1, s[i].station->name);
         plan->row[plan->n] = s[i].plan;
         name_row(&plan->row[plan->n++], whose);
     }
@@ -124,7 +124,7 @@ static void add_tripods(const struct site *site, struct site_plan *plan)
     }
     if (n == 0) return;
     site_describe_tripod(first, text, sizeof text);
-    snprintf(why, sizeof why, "%.40s%s%.150s", n > 1 ? first->station->name : "", n > 1 ? ": " : "", text);
+    snprintf(why, sizeof why, "%s%s%.150s", n > 1 ? first->station->name : "", n > 1 ? ": " : "", text);
     const char *method = !first->tripod.cast.has_legs           ? "cone"
                          : first->tripod.cast.cos_opening > 1.0 ? "legs"
                                                                 : "cone and legs";

@@ -265,6 +265,19 @@ static void set_time(const struct site *site, uint32_t k, struct site_station *s
     s->t_s = s->frame / p->frames_per_s;
 }
 
+/* Digits that tell the numbers of all stops from each other: nine, or as many as the step between two needs. */
+static int count_digits(const struct site *site)
+{
+    const struct config_platform *p = &site->cfg->platform;
+    const uint32_t n_times = site->n_stations / site->cfg->n_stations;
+    int digits = 9;
+    if (!(p->frames_per_s > 0.0)) return digits;
+    const double whole = floor(log10(p->first_frame + (n_times - 1) * p->frame_step)) + 1.0;
+    while (digits < 17 && pow(10.0, whole - digits) > p->frame_step)
+        digits++;
+    return digits;
+}
+
 /* Without a trajectory the stops are all stations of the configuration at the first time, then all at the next time.
  * The times are numbered from 1 on, as way-points are. The frame of a stop is the number of its time, unless the
  * configuration counts in frames (set_time). */
@@ -278,8 +291,10 @@ static void add_standing(struct site *site, const struct site_station *standing,
     site->stop[i] = *station;
     s->frame = k + 1;
     set_time(site, k, s);
-    snprintf(site->stop[i].name, sizeof site->stop[i].name, "%.*s frame %.9g", (int)sizeof site->stop[i].name - 24,
-             station->name, s->frame);
+    char number[24]; /* %.17g of a number from 0 on has up to 23 bytes */
+    snprintf(number, sizeof number, "%.*g", count_digits(site), s->frame);
+    snprintf(site->stop[i].name, sizeof site->stop[i].name, "%.*s frame %s", CONFIG_NAME_LEN - 1, station->name,
+             number);
 }
 
 static int add_stop(struct site *site, const struct part *part, uint32_t i, struct sh_err *err)

@@ -276,6 +276,26 @@ static int check_stations(const struct site *site, const struct sh_report *repor
     return rc;
 }
 
+/* Warns of the first station far outside of the grid that the scene's coordinates are said to be in. Mostly the scene has
+ * coordinates of its own, near 0. The limits of UTM and UPS are those of MGRS (GeographicLib, UTMUPS), with a wide
+ * overlap between zones. */
+static void check_grid(const struct site *site, const struct sh_report *report)
+{
+    const struct geoframe *f = &site->anchor.frame;
+    if (!site->anchor.known || f->kind != GEOFRAME_GRID) return;
+    const double least_m = f->zone != 0 ? 1e5 : f->north ? 13e5 : 8e5;
+    const double most_m = f->zone != 0 ? 9e5 : f->north ? 27e5 : 32e5;
+    for (uint32_t i = 0; i < site->n_stations; i++) {
+        const double easting_m = site->station[i].at.position_m[0];
+        if (easting_m >= least_m && easting_m <= most_m) continue;
+        sh_warn(report,
+                "station %u %s: easting %.10g m is far outside of the scene's grid (scene.anchor), whose eastings are "
+                "%.0f to %.0f m; a scene with coordinates of its own is anchored with source: explicit",
+                i + 1, site->station[i].station->name, easting_m, least_m, most_m);
+        return;
+    }
+}
+
 int site_check_plausibility(const struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     check_size(site, report);
@@ -285,5 +305,6 @@ int site_check_plausibility(const struct site *site, const struct sh_report *rep
     check_attributes(site, report);
     check_colours(site, report);
     check_clear(site, report);
+    check_grid(site, report);
     return check_stations(site, report, err);
 }

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* scene.target: scans objects by name. The others are left out of the scene, or stay in it and give no echo. */
-#include <fnmatch.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,11 +9,6 @@
 #include "firmware_sim/site/steps.h"
 
 enum { MOST_NEAR = 3, NEAR_LETTERS = 2 };
-
-static int fits(const char *pattern, const struct scene_surface *surface)
-{
-    return fnmatch(pattern, surface->object, 0) == 0;
-}
 
 /* The distance of a pattern from a name, without wildcards and in small letters. */
 static size_t distance_of(const char *pattern, const char *name)
@@ -92,7 +86,7 @@ static int find_targets(const struct site *site, uint8_t *is_target, struct sh_e
     for (uint32_t k = 0; k < target->n_objects; k++) {
         int found = 0;
         for (uint32_t i = 0; i < site->n_surfaces; i++) {
-            if (!fits(target->object[k], site_surface(site, i))) continue;
+            if (!scene_name_fits(target->object[k], site_surface(site, i)->object)) continue;
             is_target[i] = 1;
             found = 1;
         }

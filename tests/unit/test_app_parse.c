@@ -238,7 +238,8 @@ static void rows_are_taken_from_another_command(void **state)
 
 static void numbers_in_a_row(void **state)
 {
-    static const char *const bad[] = {"", "1", "1,2,", "1,2,3", "1;2", ",2", "1,nan", "inf,1", "1,2 "};
+    static const char *const bad[] = {"",      "1",     "1,2,", "1,2,3", "1;2",  ",2",
+                                      "1,nan", "inf,1", "1,2 ", "0x1,2", "1,0X2"};
     double two[2];
     (void)state;
     assert_int_equal(app_read_numbers("1,-2.5", ',', two, 2), 1);

@@ -246,6 +246,16 @@ static void a_changed_file_is_made_again(void **state)
     fclose(file);
     assert_int_equal(truncate("d/0003_station-1_noise.seed=2.ply", 10), 0);
     assert_int_equal(unlink("d/0004_station-2_noise.seed=2.surfaces.csv"), 0);
+    snprintf(said, sizeof said,
+             "scanhead: warning: d/0003_station-1_noise.seed=2.ply: has 10 bytes, but had %llu; job 3 is to be done "
+             "again\nscanhead: warning: d/0004_station-2_noise.seed=2.surfaces.csv: is missing; job 4 is to be done "
+             "again\n",
+             was);
+    char listed[1024];
+    snprintf(listed, sizeof listed, "done %s station 1 noise.seed=1\ndone %s station 2 noise.seed=1\n", NAMES[0],
+             NAMES[1]); /* the second file's size is right */
+    strcat(listed, list_of("-    ", 2, 1));
+    batch(ALL "--list", 0, listed, said);
     snprintf(
         said, sizeof said,
         "scanhead: job 2, 0002_station-2_noise.seed=1: d/0002_station-2_noise.seed=1.ply: its contents have changed "

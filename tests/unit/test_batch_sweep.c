@@ -135,6 +135,31 @@ static void test_ranges(void **state)
     assert_string_equal(values("a=0:0:1"), "(a=0)");
     assert_string_equal(values("a=1e-9:2e-9:1e-9"), "(a=1e-09)(a=2e-09)");
     assert_string_equal(values("a=1e300:2e300:1e300"), "(a=1e+300)(a=2e+300)");
+    /* more digits than a double has; the largest seed */
+    assert_string_equal(values("a=1234567890123456:1234567890123476:10"),
+                        "(a=1234567890123456)(a=1234567890123466)(a=1234567890123476)");
+    assert_string_equal(values("a=18446744073709551613:18446744073709551615:2"),
+                        "(a=18446744073709551613)(a=18446744073709551615)");
+    assert_string_equal(values("a=-9007199254740993:-9007199254740995:-1"),
+                        "(a=-9007199254740993)(a=-9007199254740994)(a=-9007199254740995)");
+    assert_string_equal(values("a=-1:+1:1"), "(a=-1)(a=0)(a=1)");
+    assert_string_equal(values("a=0:10:20"), "(a=0)");
+    assert_string_equal(values("a=1000000000000.5:1000000000001:0.25"),
+                        "(a=1000000000000.5)(a=1000000000000.75)(a=1000000000001)");
+    static const char *const fine[] = {"a=1234567890123456:1234567890123476:10.0",
+                                       "a=1234567890123.5:1234567890124:0.0625"};
+    for (size_t i = 0; i < sizeof fine / sizeof fine[0]; i++) {
+        char want[256];
+        snprintf(want, sizeof want,
+                 "!--sweep %s: a value has more than 15 digits; allowed up to 15, or whole numbers "
+                 "of up to 64 bits for FIRST, LAST and STEP",
+                 fine[i]);
+        if (strcmp(values(fine[i]), want) != 0) fail_msg("%s: %s", fine[i], values(fine[i]));
+    }
+    assert_string_equal(values("a=0x1:3:1"), "(a=0x1:3:1)"); /* no range: numbers are decimal */
+    assert_string_equal(values("a=1:3:5"), "(a=1)");
+    assert_int_equal(values("a=3:1:5")[0], '!');
+    assert_int_equal(values("a=1:2:0.0")[0], '!');
     assert_int_equal(values("a=1:2:0")[0], '!');
     assert_int_equal(values("a=2:1:1")[0], '!');
     assert_non_null(strstr(values("a=0:10000:1"), "at most 10000"));

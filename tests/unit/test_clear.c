@@ -31,8 +31,8 @@ static void rules_fit_their_names_alone(void **state)
         {"pane", "house", 0.75, "{material: \"pane\", glass: 0.75}"},
         {"", "house", 0.75, "{object: \"house\", glass: 0.75}"},
         {"pane", "", 1.0, "{material: \"pane\", glass: 0.9}"}, /* some light is scattered */
-        {"a*b?c[d", "", 0.5, "{material: \"a\\\\*b\\\\?c\\\\[d\", glass: 0.5}"},
-        {"a\\b", "", 0.5, "{material: \"a\\\\\\\\b\", glass: 0.5}"},
+        {"a*b?c[d", "", 0.5, "{material: \"a\\\\*b\\\\?c[d\", glass: 0.5}"},
+        {"a\\b", "", 0.5, "{material: \"a\\\\b\", glass: 0.5}"},
         {"say \"a\"", "", 0.5, "{material: \"say \\\"a\\\"\", glass: 0.5}"},
         {"\x01\x1f \x7e\x7f", "", 0.5, "{material: \"\\x01\\x1f ~\\x7f\", glass: 0.5}"},
         {"K\xc3\xbc", "", 0.5, "{material: \"K\xc3\xbc\", glass: 0.5}"},

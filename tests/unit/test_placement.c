@@ -296,6 +296,35 @@ static void headings_and_convergence(void **state)
     assert_near(azimuth_deg, 50 + convergence_deg, 3e-4);
 }
 
+/* At the edge of what UTM can reach (easting 0), a range's error, taken from points 50 m to either side, is left out. A
+ * scene near 0 is hardly in UTM, which is said once. */
+static void a_place_at_the_edge_of_utm(void **state)
+{
+    (void)state;
+    static const char anchor[] = "  anchor: {source: utm, utm_zone: 33, hemisphere: north}";
+    static const struct {
+        double easting_m;
+        int warns, has_ranges;
+    } rows[] = {{0.3, 1, 0}, {60, 1, 1}, {99999, 1, 1}, {100001, 0, 1}, {899999, 0, 1}, {900001, 1, 1}};
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        char text[128], *printed = NULL;
+        size_t len = 0;
+        write_floor(rows[i].easting_m, 0, 0);
+        snprintf(text, sizeof text, "  - {position_m: [%.1f, 0, 2]}\n  - {position_m: [%.1f, 1, 2]}", rows[i].easting_m,
+                 rows[i].easting_m);
+        ok(load(anchor, text, "local"));
+        const char *far = strstr(warned, " m is far outside of the scene's grid (scene.anchor), whose eastings are 1");
+        assert_int_equal(far != NULL, rows[i].warns);
+        if (far != NULL && strstr(far + 8, "far outside") != NULL) fail_msg("%s", warned);
+        FILE *out = open_memstream(&printed, &len);
+        ok(check_print_station(site, 0, out, &err));
+        fclose(out);
+        assert_int_equal(strstr(printed, "ranges are grid lengths") != NULL, rows[i].has_ranges);
+        assert_non_null(strstr(printed, "y axis"));
+        free(printed);
+    }
+}
+
 static void the_house_has_its_site(void **state)
 {
     (void)state;
@@ -413,6 +442,7 @@ int main(void)
         cmocka_unit_test(what_has_no_place_is_refused),
         cmocka_unit_test(headings_and_convergence),
         cmocka_unit_test(a_map_conversion_goes_before_a_site),
+        cmocka_unit_test(a_place_at_the_edge_of_utm),
         cmocka_unit_test(the_house_has_its_site),
     };
     return cmocka_run_group_tests(tests, site_rig_setup, tear_down);

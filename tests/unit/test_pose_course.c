@@ -96,6 +96,38 @@ static void test_heading(void **state)
     trajectory_free(tr);
 }
 
+/* config/moving.md explains the curve with these points and figures. Three points define a parabola: after 0, 2 and 3 s
+ * x is -1, 1 and 1, and y is 0, 0 and 1. Rests change no place. Two more points about the turn keep the platform on the lines. */
+static void test_the_manual_s_turn(void **state)
+{
+    (void)state;
+    struct pose pose;
+    double frame;
+    struct trajectory *tr = read_way("-1,0,0,1,0\n1,0,0,1,0\n1,1,0,1,0\n");
+    for (double t = 0; t <= 3; t += 0.125) {
+        trajectory_at(tr, t, &pose, &frame);
+        assert_true(fabs(pose.position_m[0] - (-1 + 5 * t / 3 - t * t / 3)) < 1e-9);
+        assert_true(fabs(pose.position_m[1] - (t * t - 2 * t) / 3) < 1e-9);
+    }
+    trajectory_at(tr, 1, &pose, &frame);
+    assert_true(fabs(pose.position_m[0] - 0.333) < 5e-4 && fabs(pose.position_m[1] + 0.333) < 5e-4);
+    trajectory_at(tr, 0.001, &pose, &frame);
+    assert_true(fabs(hypot(pose.position_m[0] + 1, pose.position_m[1]) / 0.001 - 1.80) < 0.01);
+    trajectory_free(tr);
+    tr = read_way("-1,0,0,1,0.5\n1,0,0,1,0.5\n1,1,0,1,0\n"); /* halfway between two rests */
+    trajectory_at(tr, 1.5, &pose, &frame);
+    assert_true(fabs(pose.position_m[0] - 1 / 3.0) < 1e-4 && fabs(pose.position_m[1] + 1 / 3.0) < 1e-4);
+    trajectory_free(tr);
+    tr = read_way("-1,0,0,1,0\n0.9,0,0,1,0\n1,0,0,1,0\n1,0.1,0,1,0\n1,1,0,1,0\n");
+    for (double t = 0; t <= 3; t += 0.125) {
+        if (t > 1.9 && t < 2.1) continue; /* the bend */
+        trajectory_at(tr, t, &pose, &frame);
+        assert_true(fabs(pose.position_m[0] - fmin(-1 + t, 1)) < 1e-9);
+        assert_true(fabs(pose.position_m[1] - fmax(0, t - 2)) < 1e-9);
+    }
+    trajectory_free(tr);
+}
+
 /* A lift goes up, where the way has no heading: it keeps the last one. The curve enters the lift in a bend, which goes
  * too far to the east and comes back to the west. */
 static void test_straight_up(void **state)
@@ -118,6 +150,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_rests),
         cmocka_unit_test(test_heading),
+        cmocka_unit_test(test_the_manual_s_turn),
         cmocka_unit_test(test_straight_up),
     };
     return cmocka_run_group_tests(tests, make_file, remove_file);

@@ -168,6 +168,27 @@ static void stops_at_stations(void **state)
     expect_stop(5, "two frame 25", 2.5, 25, 3, 4);
 }
 
+/* Names of stops are as different as those of their stations: a name of the longest kind (31 bytes) is kept whole, and
+ * so is a character of several bytes. A frame has as many digits as tell it from the next. */
+static void names_of_stops_are_whole(void **state)
+{
+    (void)state;
+#define LONGEST "Eingang\xc3\xa4-Nord-0123456789ab-\xe2\x82\xac" /* 31 bytes */
+    _Static_assert(sizeof LONGEST == CONFIG_NAME_LEN, "the longest name of a station");
+    static const char stations[] = "{name: entrance-north, position_m: [0, 0, 2]}, {name: entrance-south, position_m: "
+                                   "[3, 4, 2]}, {name: " LONGEST ", position_m: [3, 5, 2]}";
+    take(stations, "kind: stops, step_s: 1, end_s: 0");
+    assert_int_equal(site->n_stations, 3);
+    expect_stop(0, "entrance-north frame 1", 0, 1, 0, 0);
+    expect_stop(1, "entrance-south frame 1", 0, 1, 3, 4);
+    expect_stop(2, LONGEST " frame 1", 0, 1, 3, 5);
+    take(ONE, "kind: stops, frames_per_s: 1, first_frame: 123456789, last_frame: 123456789.5, frame_step: 0.25");
+    assert_int_equal(site->n_stations, 3);
+    expect_stop(0, "one frame 123456789", 123456789, 123456789, 0, 0);
+    expect_stop(1, "one frame 123456789.2", 123456789.25, 123456789.25, 0, 0);
+    expect_stop(2, "one frame 123456789.5", 123456789.5, 123456789.5, 0, 0);
+}
+
 /* Along a trajectory the frame is the file's, or counted where the configuration counts in frames. */
 static void stops_on_a_path(void **state)
 {
@@ -227,6 +248,7 @@ int main(void)
         cmocka_unit_test(stops_have_limits),
         cmocka_unit_test(stations_are_counted),
         cmocka_unit_test(stops_at_stations),
+        cmocka_unit_test(names_of_stops_are_whole),
         cmocka_unit_test(stops_on_a_path),
         cmocka_unit_test(stops_on_the_earth),
         cmocka_unit_test(a_live_head_reaches_all_stations),

@@ -138,15 +138,57 @@ static void targets_are_chosen_in_all_meshes(void **state)
     site_free(site);
 }
 
+/* Patterns have * and ? alone: no brackets and no backslash of a shell's. ? is a character, not a byte. */
+static void names_fit_patterns(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *pattern, *fits, *not ;
+    } rows[] = {
+        {"", "", "a"},
+        {"*", "", NULL},
+        {"*", "a[1]\\", NULL},
+        {"a*", "a", "ba"},
+        {"*a*b*", "xxaybyab", "ba"},
+        {"*aab", "aaab", "aabb"}, /* the star takes more once the rest doesn't fit */
+        {"a*b?d", "abcbcd", "abcd\xc3\xa4"},
+        {"b[1]", "b[1]", "b1"},
+        {"[a-c]", "[a-c]", "b"},
+        {"a\\b", "a\\b", "ab"},
+        {"a\\\\b", "a\\\\b", "a\\b"},
+        {"\\*", "*", "\\x"},
+        {"a\\?*", "a?b", "abc"},
+        {"a\\\\*", "a\\*", "a\\x"}, /* a\* is a name, too: its backslash stands before an escaped star */
+        {"a\\", "a\\", "a"},
+        {"K?che",
+         "K\xc3\xbc"
+         "che",
+         "K\xc3\xbc"
+         "xche"},
+        {"*?", "\xe2\x82\xac", ""},
+        {"?", "\xe2\x82\xac",
+         "\xe2\x82\xac"
+         "a"},
+        {"??", "\xfc\xc3", "\xfc"}, /* Latin-1, which is no UTF-8: each byte is one */
+        {"A", "A", "a"},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        if (!scene_name_fits(rows[i].pattern, rows[i].fits)) fail_msg("%s: not %s", rows[i].pattern, rows[i].fits);
+        if (rows[i].not != NULL && scene_name_fits(rows[i].pattern, rows[i].not ))
+            fail_msg("%s: %s", rows[i].pattern, rows[i].not );
+    }
+}
+
 /* If a mesh has copies, each copy of a target counts. */
 static void targets_count_in_all_copies(void **state)
 {
     (void)state;
-    static const char *const target[] = {"{objects: [b], others: hide}", "{objects: [a], others: hide}",
+    static const char *const target[] = {"{objects: ['b[1]\\x'], others: hide}", "{objects: [a], others: hide}",
                                          "{objects: [\"*\"], others: hide}"};
     static const uint32_t triangles[] = {6, 3, 9};
-    write_in("cube.obj", "o a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\no b\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\nf 4 5 6\n"
-                         "f 5 7 6\n");
+    write_in("cube.obj",
+             "o a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\no b[1]\\x\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\nf 4 5 6\n"
+             "f 5 7 6\n");
     for (int i = 0; i < 3; i++) {
         char text[512];
         struct site *site;
@@ -202,7 +244,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_left_has_its_own_numbers), cmocka_unit_test(silent_surfaces_give_no_echo),
         cmocka_unit_test(targets_are_chosen_in_all_meshes), cmocka_unit_test(targets_count_in_all_copies),
-        cmocka_unit_test(wrong_targets_are_refused),
+        cmocka_unit_test(wrong_targets_are_refused),        cmocka_unit_test(names_fit_patterns),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

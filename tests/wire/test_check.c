@@ -177,18 +177,13 @@ static void test_transparent(void **state)
                     "mtllib pane.mtl\nv 0 0 0\nv 9 0 0\nv 9 9 0\nv 0 9 0\nusemtl a [1]\no x\nf 1 2 3\no y\nf 1 3 4\n"
                     "usemtl b\nf 1 2 4\nusemtl c\nf 2 3 4\n");
     for (int i = 0; i < 2; i++) {
-        char *escaped = strdup(line), *at = i == 0 ? NULL : strstr(escaped, "[1]");
-        snprintf(text, sizeof text, "%s", begin);
-        if (at != NULL)
-            snprintf(text + strlen(text), sizeof text - strlen(text), "%.*s\\\\%s\n", (int)(at - escaped), escaped, at);
-        free(escaped);
+        snprintf(text, sizeof text, "%s%s\n", begin, i == 0 ? "" : line);
         wire_write_text(wire, "pane.yaml", text);
         run(wire, "check @pane.yaml --scene", 0);
         char *err = wire_read(wire_path(wire, "err"), NULL), *out = wire_read(wire_path(wire, "out"), NULL);
         rules = strstr(err, "3 surfaces are transparent in the file, but scanned as opaque;");
         assert_int_equal(rules != NULL, i == 0);
-        if (i == 0)
-            assert_non_null(strstr(rules, "{material: \"a \\\\[1]\", glass: 0.7}, {material: \"b\", glass: 0.9}]"));
+        if (i == 0) assert_non_null(strstr(rules, line));
         if (strstr(out, "clear     70 %: x, material a [1]\n") == NULL ||
             strstr(out, "clear     100 %: y, material b\n") == NULL || strstr(out, "material c") != NULL)
             fail_msg("%s", out);

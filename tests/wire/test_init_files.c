@@ -63,7 +63,7 @@ static void long_names_of_glass_stay_whole(void **state)
     struct wire *wire = *state;
     char name[251], text[2048], rule[2048] = "# surfaces: [{material: \"";
     for (size_t i = 0; i < sizeof name - 1; i++)
-        name[i] = i % 2 == 0 ? '[' : 'x';
+        name[i] = i % 2 == 0 ? '*' : 'x';
     name[sizeof name - 1] = '\0';
     snprintf(text, sizeof text, "newmtl %s\nKd 1 1 1\nd 0.3\n", name);
     wire_write_text(wire, "pane.mtl", text);
@@ -71,7 +71,7 @@ static void long_names_of_glass_stay_whole(void **state)
              "mtllib pane.mtl\nv 0 0 0\nv 9 0 0\nv 9 0 3\nv 0 0 3\no pane\nusemtl %s\nf 1 2 3\nf 1 3 4\n", name);
     wire_write_text(wire, "pane.obj", text);
     for (const char *p = name; *p != '\0'; p++)
-        strcat(rule, *p == '[' ? "\\\\[" : "x");
+        strcat(rule, *p == '*' ? "\\\\*" : "x");
     strcat(rule, "\", glass: 0.7}]\n");
     if (init(wire, "pane.obj") != 0) fail_msg("%s", err_text);
     has(made, rule);

@@ -35,8 +35,8 @@ static int page_read_word(struct page_word *words, const char *text, size_t len,
         const int value_len = equals != NULL ? (int)(len - name_len - 1) : 0;
         if (value_len == 0) return page_fail_word(w, "", 0, err);
         w->value = strtod(equals + 1, &end);
-        if (end != text + len || !(w->value >= w->min && w->value <= w->max) ||
-            (w->whole && w->value != floor(w->value)))
+        if (end != text + len || strcspn(equals + 1, "xX") < (size_t)(end - equals - 1) ||
+            !(w->value >= w->min && w->value <= w->max) || (w->whole && w->value != floor(w->value)))
             return page_fail_word(w, equals + 1, value_len < 64 ? value_len : 64, err);
         return SH_OK;
     }

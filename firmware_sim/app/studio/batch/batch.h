@@ -78,6 +78,8 @@ void batch_line_free(struct batch_line *line);
 int batch_find_done(struct batch *b, int any_engine, struct sh_err *err);
 /* Whether a done job's files are as its entry says; else why not. SH_ESTOPPED after a signal. */
 int batch_check_files(const struct batch *b, uint32_t job, struct sh_err *err);
+/* The same by the files' sizes alone, which takes no time. */
+int batch_check_sizes(const struct batch *b, uint32_t job, struct sh_err *err);
 
 /* ---- run.c: the jobs of a shard that aren't done. Returns the exit status, with what failed printed. */
 int batch_run(struct batch *b);
@@ -88,7 +90,8 @@ int batch_merge(struct batch *b);
 
 /* Writes number, name, station and settings of job i as members of the open object. */
 void batch_put_job(struct json *json, const struct batch *b, uint32_t i);
-/* The list of jobs as text or as JSON (list.c); with a folder, which of them have a line in a manifest. */
+/* The list of jobs as text or as JSON (list.c); with a folder, which of them have a line in a manifest and
+ * files of that line's sizes. */
 int batch_list(struct batch *b);
 
 #endif

@@ -59,20 +59,36 @@ int batch_find_done(struct batch *b, int any_engine, struct sh_err *err)
     return SH_OK;
 }
 
+/* Returns the file's path in *path. */
+static int check_size(const struct batch *b, const struct batch_file *file, char path[PATH_MAX], struct sh_err *err)
+{
+    struct stat st;
+    snprintf(path, PATH_MAX, "%s/%s", b->dir, file->name);
+    if (stat(path, &st) != 0) return sh_fail(err, SH_EIO, "%s: is missing", path);
+    if ((uint64_t)st.st_size == file->bytes) return SH_OK;
+    return sh_fail(err, SH_EIO, "%s: has %llu bytes, but had %llu", path, (unsigned long long)st.st_size,
+                   (unsigned long long)file->bytes);
+}
+
+int batch_check_sizes(const struct batch *b, uint32_t job, struct sh_err *err)
+{
+    const struct batch_entry *entry = &b->job[job].entry;
+    char path[PATH_MAX];
+    int rc = SH_OK;
+    for (uint32_t i = 0; i < entry->n_files && rc == SH_OK; i++)
+        rc = check_size(b, &entry->file[i], path, err);
+    return rc;
+}
+
 int batch_check_files(const struct batch *b, uint32_t job, struct sh_err *err)
 {
     const struct batch_entry *entry = &b->job[job].entry;
     for (uint32_t i = 0; i < entry->n_files; i++) {
         const struct batch_file *file = &entry->file[i];
         char path[PATH_MAX], sha[BATCH_SHA_LEN];
-        struct stat st;
         uint64_t bytes;
-        snprintf(path, sizeof path, "%s/%s", b->dir, file->name);
-        if (stat(path, &st) != 0) return sh_fail(err, SH_EIO, "%s: is missing", path);
-        if ((uint64_t)st.st_size != file->bytes)
-            return sh_fail(err, SH_EIO, "%s: has %llu bytes, but had %llu", path, (unsigned long long)st.st_size,
-                           (unsigned long long)file->bytes);
-        int rc = batch_sha_file(path, sha, &bytes, &app_report_stderr, err);
+        int rc = check_size(b, file, path, err);
+        if (rc == SH_OK) rc = batch_sha_file(path, sha, &bytes, &app_report_stderr, err);
         if (rc != SH_OK) return rc;
         if (strcmp(sha, file->sha) != 0) return sh_fail(err, SH_EIO, "%s: its contents have changed (sha256)", path);
     }

@@ -49,10 +49,22 @@ static void print_jobs(const struct batch *b)
     }
 }
 
+/* Contents aren't read for a list: that would take as long as the check of the whole campaign. */
+static void drop_cut_files(struct batch *b)
+{
+    for (uint32_t i = 0; i < b->n_jobs; i++) {
+        struct sh_err why;
+        if (!batch_is_mine(b, i) || !b->job[i].is_done || batch_check_sizes(b, i, &why) == SH_OK) continue;
+        sh_warn(&app_report_stderr, "%s; job %u is to be done again", why.text, i + 1);
+        b->job[i].is_done = 0;
+    }
+}
+
 int batch_list(struct batch *b)
 {
     struct sh_err err = {0};
     if (b->dir != NULL && batch_find_done(b, 1, &err) != SH_OK) return app_fail(&err);
+    drop_cut_files(b);
     if (!b->json) {
         print_jobs(b);
         return APP_OK;

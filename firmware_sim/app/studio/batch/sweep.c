@@ -2,6 +2,7 @@
 #include "firmware_sim/app/studio/batch/sweep.h"
 
 #include <ctype.h>
+#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -68,27 +69,76 @@ static int add_list(struct batch_sweep *s, const char *values, struct sh_err *er
     }
 }
 
-/* The last value may lie beyond LAST by a rounding error: 1e-9 of a step. Values are rounded to the last decimal that a
- * double of the range's size has: 0.3 and not 0.30000000000000004, 0 and not 5.5e-17. */
-static int add_range(struct batch_sweep *s, const char *values, const double range[3], struct sh_err *err)
+/* Whether there are so many steps from FIRST to LAST; below 0: LAST lies in the other direction, or STEP is 0. */
+static int check_steps(const struct batch_sweep *s, const char *values, double steps, struct sh_err *err)
 {
-    const double steps = floor((range[1] - range[0]) / range[2] + 1e-9);
-    if (!(steps >= 0.0) || range[2] == 0.0)
+    if (!(steps >= 0.0))
         return sh_fail(err, SH_EINPUT,
                        "--sweep %s=%s: no value from FIRST to LAST; allowed FIRST:LAST:STEP as in 0:10:2", s->key,
                        values);
     if (steps >= BATCH_MAX_VALUES)
         return sh_fail(err, SH_EINPUT, "--sweep %s=%s: %.9g values; allowed at most %d", s->key, values, steps + 1.0,
                        BATCH_MAX_VALUES);
+    return SH_OK;
+}
+
+/* The last value may lie beyond LAST by a rounding error: 1e-9 of a step. Values are rounded to the last decimal that a
+ * double of the range's size has: 0.3 and not 0.30000000000000004, 0 and not 5.5e-17. A range is refused where this
+ * changes a value by more than 1 % of a step. */
+static int add_range(struct batch_sweep *s, const char *values, const double range[3], struct sh_err *err)
+{
+    const double steps = range[2] != 0.0 ? floor((range[1] - range[0]) / range[2] + 1e-9) : -1.0;
+    int rc = check_steps(s, values, steps, err);
+    if (rc != SH_OK) return rc;
     const double decimals = 14.0 - floor(log10(fmax(fabs(range[0]), fabs(range[1]))));
     const double per_unit = pow(10.0, fmin(fmax(decimals, 0.0), 300.0));
-    for (int i = 0, rc; i <= (int)steps; i++) {
+    for (int i = 0; i <= (int)steps; i++) {
         char text[32];
-        const double value = round((range[0] + i * range[2]) * per_unit) / per_unit;
+        const double exact = range[0] + i * range[2], value = round(exact * per_unit) / per_unit;
         const int n = snprintf(text, sizeof text, "%.15g", value + 0.0); /* no -0 */
+        if (fabs(strtod(text, NULL) - exact) > 0.01 * fabs(range[2]))
+            return sh_fail(err, SH_EINPUT,
+                           "--sweep %s=%s: a value has more than 15 digits; allowed up to 15, or whole numbers of up "
+                           "to 64 bits for FIRST, LAST and STEP",
+                           s->key, values);
         if ((rc = add_value(s, text, (size_t)n, err)) != SH_OK) return rc;
     }
     return SH_OK;
+}
+
+/* Takes a whole number of up to 64 bits beside its sign at *p, which is moved on after `end`. */
+static int take_whole(const char **p, char end, __int128 *out)
+{
+    const char *digits = *p + (**p == '-' || **p == '+');
+    const size_t n = strspn(digits, "0123456789");
+    errno = 0;
+    const unsigned long long size = strtoull(digits, NULL, 10);
+    if (n == 0 || digits[n] != end || errno != 0) return 0;
+    *out = **p == '-' ? -(__int128)size : (__int128)size;
+    *p = digits + n + (end != '\0');
+    return 1;
+}
+
+static int read_whole(const char *values, __int128 range[3])
+{
+    return take_whole(&values, ':', &range[0]) && take_whole(&values, ':', &range[1]) &&
+           take_whole(&values, '\0', &range[2]);
+}
+
+/* Each digit counts: a seed has up to 20, more than a double. */
+static int add_whole_range(struct batch_sweep *s, const char *values, const __int128 range[3], struct sh_err *err)
+{
+    const __int128 way = range[1] - range[0], step = range[2];
+    const int is_empty = step == 0 || (way != 0 && (way < 0) != (step < 0));
+    int rc = check_steps(s, values, is_empty ? -1.0 : (double)(way / step), err);
+    for (__int128 i = 0; rc == SH_OK && i <= way / step; i++) {
+        const __int128 value = range[0] + i * step;
+        char text[32];
+        const int n = snprintf(text, sizeof text, "%s%llu", value < 0 ? "-" : "",
+                               (unsigned long long)(value < 0 ? -value : value));
+        rc = add_value(s, text, (size_t)n, err);
+    }
+    return rc;
 }
 
 /* Skips ], so that a[0].b equals a.0.b where [ counts as a point. */
@@ -111,6 +161,7 @@ int batch_sweeps_add(struct batch_sweeps *sweeps, const char *text, struct sh_er
 {
     const char *equals = strchr(text, '=');
     double range[3];
+    __int128 whole[3];
     if (equals == NULL || equals == text || equals[1] == '\0')
         return sh_fail(err, SH_EINPUT,
                        "--sweep %s: allowed KEY=A,B,... or KEY=FIRST:LAST:STEP, as in head.prr_hz=300000,600000", text);
@@ -129,6 +180,7 @@ int batch_sweeps_add(struct batch_sweeps *sweeps, const char *text, struct sh_er
                            "--sweep %s: it would replace the values of --sweep %s; allowed is the other order", s->key,
                            sweeps->sweep[i].key);
     }
+    if (read_whole(equals + 1, whole)) return add_whole_range(s, equals + 1, whole, err);
     const int has_blank = strpbrk(equals + 1, " \t") != NULL;
     return !has_blank && app_read_numbers(equals + 1, ':', range, 3) ? add_range(s, equals + 1, range, err)
                                                                      : add_list(s, equals + 1, err);

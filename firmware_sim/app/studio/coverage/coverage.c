@@ -70,7 +70,7 @@ static int look_from(struct coverage_run *r, uint32_t i, struct sh_err *err)
     struct site *site = sites_of(&r->sites, i);
     struct coverage_scan_at *at = malloc(sizeof *at);
     struct coverage_result_station *s = &r->result.station[i];
-    char what[96];
+    char what[CONFIG_STATION_NAME_LEN + 48];
     double gain_m2;
     if (at == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a scan");
     snprintf(what, sizeof what, "station %u of %u (%s)", i + 1, r->site->n_stations, r->site->station[i].station->name);

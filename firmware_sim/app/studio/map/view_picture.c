@@ -119,9 +119,12 @@ static void name_station(const struct picturing *p, uint32_t station, char *out,
 
 static void name_label(const struct picturing *p, uint32_t label, char *out, size_t room)
 {
-    if (p->site != NULL && label < p->site->n_surfaces)
-        snprintf(out, room, "%s | %s", site_surface(p->site, label)->object, site_surface(p->site, label)->material);
-    else
+    if (p->site != NULL && label < p->site->n_surfaces) {
+        char whole[2 * SCENE_NAME_LEN + 4];
+        const int n = snprintf(whole, sizeof whole, "%s | %s", site_surface(p->site, label)->object,
+                               site_surface(p->site, label)->material);
+        scene_copy_name(out, room, whole, (size_t)n);
+    } else
         snprintf(out, room, label == CLOUD_LABEL_NONE ? "no label" : "label %u", label);
 }
 

@@ -108,7 +108,7 @@ static uint32_t put_stations(FILE *out, const struct view *v, const struct cloud
     const double height = scale * (p->max_m[1] - p->min_m[1]), letter = 8.5; /* bold, of 14 units */
     struct picture_box taken[2 * MOST_NAMES];
     uint32_t n_taken = 0, left_out = 0;
-    char name[96];
+    char name[CONFIG_STATION_NAME_LEN + 16];
     double at[2];
     for (uint32_t s = 0; s < n && n_taken < MOST_NAMES; s++) {
         station_at(v, p, scale, s, at);

@@ -83,7 +83,7 @@ static void end_table(FILE *out)
 
 void report_put_stations(FILE *out, const struct report *r)
 {
-    char name[96];
+    char name[CONFIG_STATION_NAME_LEN + 16];
     fputs("<h2>Stations</h2>\n", out);
     begin_table(out, "Each station by itself.", "station", 1);
     for (uint32_t s = 0; s < r->site->n_stations; s++) {

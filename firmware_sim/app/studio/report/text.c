@@ -144,7 +144,7 @@ static void print_labels(const struct report *r)
 
 static void print_tables(const struct report *r)
 {
-    char name[64];
+    char name[CONFIG_STATION_NAME_LEN + 16];
     print_head("by station");
     for (uint32_t s = 0; s < r->site->n_stations; s++) {
         snprintf(name, sizeof name, "%" PRIu32 " %s", s + 1, r->site->station[s].station->name);
