@@ -102,11 +102,12 @@ static int add_option(struct files *f, const struct app_file *file)
 {
     const size_t len = strlen(file->path), stem = len > file->n_ending ? len - file->n_ending : 0;
     char *who = file->option != NULL ? join("--", 2, file->option, "") : join("the operand ", 12, file->path, "");
-    char *path = file->ending != NULL ? join(file->path, stem, file->ending, "") : strdup(file->path);
-    const size_t n_ending = file->ending != NULL ? strlen(file->ending) : file->n_ending;
+    const char *added = file->added != NULL ? file->added : "";
+    char *path = file->ending != NULL ? join(file->path, stem, file->ending, "") : join(file->path, len, added, "");
+    const size_t n_ending = file->ending != NULL ? strlen(file->ending) : file->n_ending + strlen(added);
     const int rc = outputs_add(f, who, path, file->use == APP_WRITES, file->each ? n_ending : 0);
     if (rc != SH_OK) return rc;
-    f->file[f->n - 1].is_sidecar = file->ending != NULL;
+    f->file[f->n - 1].is_sidecar = file->ending != NULL || file->added != NULL;
     f->file[f->n - 1].needs_place = file->is_given && file->use == APP_WRITES;
     return SH_OK;
 }

@@ -101,13 +101,17 @@ static void files_beside_a_file(void **state)
     static const struct {
         const char *other;
         int rc;
-    } cases[] = {{"x.obj", SH_EINPUT}, {"./x-12.obj", SH_EINPUT}, {"x-.obj", SH_OK},   {"x-1.ply", SH_OK},
-                 {"x.mtl", SH_EINPUT}, {"x-3.mtl", SH_EINPUT},    {"x-3a.mtl", SH_OK}, {"y-3.mtl", SH_OK}};
+    } cases[] = {{"x.obj", SH_EINPUT},      {"./x-12.obj", SH_EINPUT},   {"x-.obj", SH_OK},   {"x-1.ply", SH_OK},
+                 {"x.mtl", SH_EINPUT},      {"x-3.mtl", SH_EINPUT},      {"x-3a.mtl", SH_OK}, {"y-3.mtl", SH_OK},
+                 {"x.obj.part", SH_EINPUT}, {"x-7.obj.part", SH_EINPUT}, {"x.part", SH_OK},   {"y.obj.part", SH_OK}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         struct app_input in = {0};
         struct app_file file = {.option = "output", .path = "x.obj", .use = APP_WRITES, .n_ending = 4, .each = 1};
         assert_int_equal(app_add_file(&in, &file), APP_OK);
         file.ending = ".mtl";
+        assert_int_equal(app_add_file(&in, &file), APP_OK);
+        file.ending = NULL;
+        file.added = ".part";
         assert_int_equal(app_add_file(&in, &file), APP_OK);
         add(&in, "stats", cases[i].other, APP_WRITES);
         if (app_check_files(&in, NULL, &err) != cases[i].rc) fail_msg("%s: not %d", cases[i].other, cases[i].rc);
