@@ -189,20 +189,30 @@ static int put_empty_packet(struct left *l, struct e57_pages *pages, struct sh_e
     return rc;
 }
 
+/* The end of the file is missing still, and what was there stays: a later repair finds the same packets. */
+static int fail_end(const struct outfile *file, const struct sh_err *why, struct sh_err *err)
+{
+    const int has_no_room = file->error == ENOSPC || file->error == EFBIG || file->error == EDQUOT;
+    return sh_fail(err, why->code, "%s%s", why->text,
+                   has_no_room ? "; nothing is lost: free some room and repeat the command" : "");
+}
+
 static int write_end(struct left *l, struct sh_err *err)
 {
     static const uint8_t blank[E57_FILE_HEADER_LEN];
     struct repair *r = l->repair;
     struct outfile file;
+    struct sh_err why = {0};
     struct e57_pages pages = {.file = &file, .n_full = l->end / E57_PAGE_CONTENT, .used = l->end % E57_PAGE_CONTENT};
     int rc = get(l, l->end - pages.used, pages.page, pages.used, err);
     if (rc <= 0) return rc < 0 ? rc : fail_damaged(l, err);
     rc = outfile_over(&file, r->fd, r->path, pages.n_full * E57_PAGE, err);
     if (rc != 0) return rc;
-    rc = e57_patch(&pages, 0, blank, sizeof blank, err); /* a file with a header counts as whole */
-    if (rc == 0) rc = put_empty_packet(l, &pages, err);
+    rc = e57_patch(&pages, 0, blank, sizeof blank, &why); /* a file with a header counts as whole */
+    if (rc == 0) rc = put_empty_packet(l, &pages, &why);
     l->facts.is_incomplete = 1;
-    if (rc == 0) rc = e57_end(&pages, &l->facts, NULL, err);
+    if (rc == 0) rc = e57_end(&pages, &l->facts, NULL, &why);
+    if (rc != 0) rc = fail_end(&file, &why, err);
     outfile_leave(&file);
     return rc;
 }

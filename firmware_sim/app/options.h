@@ -18,7 +18,7 @@ extern const char *app_program;
 /* The exit status of a command. APP_GO_ON is none: the command line was read, the command can begin. */
 enum { APP_GO_ON = -1, APP_OK = 0, APP_FAILED = 1, APP_USAGE = 2 };
 
-enum { APP_WORD = -1, APP_MAX_SETS = 256, APP_MAX_OPERANDS = 2, APP_MAX_OPTIONS = 64, APP_MAX_FILES = 128 };
+enum { APP_WORD = -1, APP_MAX_SETS = 256, APP_MAX_OPERANDS = 2, APP_MAX_OPTIONS = 64, APP_MAX_FILES = 512 };
 
 /* clang-format off */
 enum app_option_kind {
@@ -107,7 +107,8 @@ struct app_file {
     size_t n_ending; /* bytes of the path's ending, as in .ply */
     /* The file is a sidecar of `path`, with this ending in place of its own; NULL: `path` itself. */
     const char *ending;
-    int each; /* 1: files STEM-N.ENDING are written, too, for N from 1 on */
+    const char *added; /* the file is a sidecar of `path`, with this after its whole name; NULL: nothing */
+    int each;          /* 1: files STEM-N.ENDING are written, too, for N from 1 on */
 };
 
 /* All that a command line says, except for the command's own options. */

@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "core/grow.h"
 #include "firmware_sim/app/app.h"
@@ -20,6 +21,7 @@ struct named {
     int is_there, is_written;
     struct stat st;  /* where it is there */
     int needs_place; /* its folder must be there already */
+    int is_given;    /* by an option that writes it */
     int is_sidecar;  /* it is written beside another file: meshes of one scan share their image */
     size_t n_ending; /* where each scan gets a file of its own: bytes of the path's ending; 0: it is one file */
 };
@@ -102,12 +104,13 @@ static int add_option(struct files *f, const struct app_file *file)
 {
     const size_t len = strlen(file->path), stem = len > file->n_ending ? len - file->n_ending : 0;
     char *who = file->option != NULL ? join("--", 2, file->option, "") : join("the operand ", 12, file->path, "");
-    char *path = file->ending != NULL ? join(file->path, stem, file->ending, "") : strdup(file->path);
-    const size_t n_ending = file->ending != NULL ? strlen(file->ending) : file->n_ending;
+    const char *added = file->added != NULL ? file->added : "";
+    char *path = file->ending != NULL ? join(file->path, stem, file->ending, "") : join(file->path, len, added, "");
+    const size_t n_ending = file->ending != NULL ? strlen(file->ending) : file->n_ending + strlen(added);
     const int rc = outputs_add(f, who, path, file->use == APP_WRITES, file->each ? n_ending : 0);
     if (rc != SH_OK) return rc;
-    f->file[f->n - 1].is_sidecar = file->ending != NULL;
-    f->file[f->n - 1].needs_place = file->is_given && file->use == APP_WRITES;
+    f->file[f->n - 1].is_sidecar = file->ending != NULL || file->added != NULL;
+    f->file[f->n - 1].needs_place = f->file[f->n - 1].is_given = file->is_given && file->use == APP_WRITES;
     return SH_OK;
 }
 
@@ -191,6 +194,21 @@ static int add_all(struct files *f, const struct app_input *in, const struct con
 
 /* ---- the check */
 
+/* A link is not followed when the file is made (core/newfile.h), except for the system's own, such as /dev/stdout. A
+ * FIFO is not checked: its reader may come later, and one that waits would take the check for the end of the data. */
+static int check_link(const struct named *file, struct sh_err *err)
+{
+    struct stat st;
+    char to[200];
+    const int is_of_system = strncmp(file->path, "/dev/", 5) == 0 || strncmp(file->path, "/proc/", 6) == 0;
+    if (is_of_system || lstat(file->path, &st) != 0 || !S_ISLNK(st.st_mode)) return SH_OK;
+    const ssize_t n = readlink(file->path, to, sizeof to - 1);
+    to[n > 0 ? n : 0] = '\0';
+    return sh_fail(err, SH_EINPUT,
+                   "%s %s: is a symbolic link to %s; links are not followed: remove it, or give its target", file->who,
+                   file->path, to);
+}
+
 /* Some files are made at the end of long work. A missing folder shows now. */
 static int check_place(const struct named *file, struct sh_err *err)
 {
@@ -230,6 +248,8 @@ int app_check_files(const struct app_input *in, const struct config *cfg, struct
     for (size_t i = 0; i < f.n && rc == SH_OK; i++)
         if (f.file[i].needs_place) rc = check_place(&f.file[i], err);
     if (rc == SH_OK) rc = check(&f, err);
+    for (size_t i = 0; i < f.n && rc == SH_OK; i++)
+        if (f.file[i].is_given) rc = check_link(&f.file[i], err);
     for (size_t i = 0; i < f.n; i++) {
         free(f.file[i].who);
         free(f.file[i].path);

@@ -327,6 +327,36 @@ static void test_disk_full(void **state)
     rig_check_disk_full(rig_path("full.e57"), 3000);
 }
 
+/* The XML section of a repaired file needs room that a full disk does not have. The points stay, and the error says
+ * so. */
+static void test_repair_on_a_full_disk(void **state)
+{
+    (void)state;
+    static const char says[] = ": cannot write: File too large; nothing is lost: free some room and repeat the command";
+    const char *path = rig_path("full.e57");
+    const struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
+    struct sh_err err;
+    struct rlimit old;
+    struct repaired file;
+    rig_begin();
+    rig_descriptor(1, 1);
+    rig_anchor(&a);
+    for (uint32_t i = 0; i < 20; i++)
+        rig_points(i, 10 * i, 10 * i, points, 5);
+    fclose(rig_stream);
+    rig_stream = NULL;
+    void (*was)(int) = signal(SIGXFSZ, SIG_IGN);
+    getrlimit(RLIMIT_FSIZE, &old);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &(struct rlimit){3000, old.rlim_max}), 0);
+    const int recorded = rig_record(path, (struct recorder_options){0}, RIG_KEEP_ALWAYS, &err);
+    const int repaired = repair_file(path, NULL, &file, &err);
+    setrlimit(RLIMIT_FSIZE, &old);
+    signal(SIGXFSZ, was);
+    assert_true(recorded == SH_EIO && repaired == SH_EIO);
+    if (strstr(err.text, says) == NULL) fail_msg("%s", err.text);
+    rig_check_left(path);
+}
+
 static int tear_down(void **state)
 {
     e57rig_free();
@@ -345,6 +375,7 @@ int main(void)
         cmocka_unit_test(test_no_points),
         cmocka_unit_test(test_same_bytes),
         cmocka_unit_test(test_disk_full),
+        cmocka_unit_test(test_repair_on_a_full_disk),
         cmocka_unit_test(test_colours),
         cmocka_unit_test(test_intensity_limits),
         cmocka_unit_test(test_bounds_of_empty_shots),

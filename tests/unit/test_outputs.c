@@ -101,17 +101,49 @@ static void files_beside_a_file(void **state)
     static const struct {
         const char *other;
         int rc;
-    } cases[] = {{"x.obj", SH_EINPUT}, {"./x-12.obj", SH_EINPUT}, {"x-.obj", SH_OK},   {"x-1.ply", SH_OK},
-                 {"x.mtl", SH_EINPUT}, {"x-3.mtl", SH_EINPUT},    {"x-3a.mtl", SH_OK}, {"y-3.mtl", SH_OK}};
+    } cases[] = {{"x.obj", SH_EINPUT},      {"./x-12.obj", SH_EINPUT},   {"x-.obj", SH_OK},   {"x-1.ply", SH_OK},
+                 {"x.mtl", SH_EINPUT},      {"x-3.mtl", SH_EINPUT},      {"x-3a.mtl", SH_OK}, {"y-3.mtl", SH_OK},
+                 {"x.obj.part", SH_EINPUT}, {"x-7.obj.part", SH_EINPUT}, {"x.part", SH_OK},   {"y.obj.part", SH_OK}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         struct app_input in = {0};
         struct app_file file = {.option = "output", .path = "x.obj", .use = APP_WRITES, .n_ending = 4, .each = 1};
         assert_int_equal(app_add_file(&in, &file), APP_OK);
         file.ending = ".mtl";
         assert_int_equal(app_add_file(&in, &file), APP_OK);
+        file.ending = NULL;
+        file.added = ".part";
+        assert_int_equal(app_add_file(&in, &file), APP_OK);
         add(&in, "stats", cases[i].other, APP_WRITES);
         if (app_check_files(&in, NULL, &err) != cases[i].rc) fail_msg("%s: not %d", cases[i].other, cases[i].rc);
     }
+}
+
+/* A link is not followed when the file is made, which may be after hours. So an option that names one is refused at
+ * once. The system's own links lead to open files. */
+static void links(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *path;
+        enum app_use use;
+        int is_given, rc;
+    } cases[] = {
+        {"link", APP_WRITES, 1, SH_EINPUT}, {"link", APP_READS, 1, SH_OK},         {"link", APP_WRITES, 0, SH_OK},
+        {"other", APP_WRITES, 1, SH_OK},    {"/dev/stdout", APP_WRITES, 1, SH_OK}, {"/dev/fd/1", APP_WRITES, 1, SH_OK},
+        {"-", APP_WRITES, 1, SH_OK}};
+    assert_int_equal(symlink("nowhere", "link"), 0);
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct app_input in = {0};
+        const struct app_file file = {
+            .option = "stats", .path = cases[i].path, .use = cases[i].use, .is_given = cases[i].is_given};
+        assert_int_equal(app_add_file(&in, &file), APP_OK);
+        err.text[0] = '\0';
+        if (app_check_files(&in, NULL, &err) != cases[i].rc) fail_msg("%zu: %s", i, err.text);
+        if (cases[i].rc == SH_OK) continue;
+        assert_string_equal(err.text, "--stats link: is a symbolic link to nowhere; links are not followed: remove it, "
+                                      "or give its target");
+    }
+    assert_int_equal(unlink("link"), 0);
 }
 
 /* The files that a mesh names are read, too. */
@@ -157,7 +189,7 @@ static void options_say_what_their_files_are(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(files_are_apart), cmocka_unit_test(files_beside_a_file),
-                                       cmocka_unit_test(files_of_a_mesh),
+                                       cmocka_unit_test(links), cmocka_unit_test(files_of_a_mesh),
                                        cmocka_unit_test(options_say_what_their_files_are)};
     return cmocka_run_group_tests(tests, go_there, come_back);
 }

@@ -117,6 +117,11 @@ static const struct {
     {"record @scan.shs --output=@o.ply", "scan.shs", "o.ply", "--output", "the operand"},
     {"record @scan.shs --output=@x.ply --stats=@o", "scan.shs", "o", "--stats", "the operand"},
     {"record --repair @scan.shs --stats=@o", "scan.shs", "o", "--stats", "--repair"},
+    {"record --repair @k.ptx --stats=@o", "k.ptx.part", "o", "--stats", "--repair"},
+    {"record --repair @k.ptx --stats=@o", "k.ptx.grid", "o", "--stats", "--repair"},
+    {"record --repair @k.ptx.part --stats=@o", "k.ptx.grid", "o", "--stats", "--repair"},
+    {"record --repair @k.las --stats=@o", "k.wdp.part", "o", "--stats", "--repair"},
+    {"record --repair @k.las.part --stats=@o", "k.wdp.part", "o", "--stats", "--repair"},
     {"record @c.yaml --set=scene.meshes[0].file=@o-1.obj --output=@o.obj --split", "room.obj", "o-1.obj", "--output",
      "scene.meshes[0].file"},
     {"record @c.yaml --set=platform.kind=trajectory --set=platform.file=@o-11.poses.csv --output=@o.poses.csv --each",
@@ -143,7 +148,14 @@ static const struct {
     {"record @c.yaml --output=@o.las --wdp --stats=@o.wdp", "--output", "--stats"},
     {"record @c.yaml --output=@o.ply --each --stats=@o-3.ply", "--stats", "--output"},
     {"record @c.yaml --stats=@o --truth=@./o", "--truth", "--stats"},
+    {"record @c.yaml --output=@o.ply --stats=@o.ply.part", "--output", "--stats"},
+    {"record @c.yaml --output=@o.PTX --stats=@o.PTX.grid", "--output", "--stats"},
+    {"record @c.yaml --truth=@o-2.ptx.grid --output=@o.ptx --split", "--output", "--truth"},
+    {"record @c.yaml --output=@o.las --surfaces=@o.wdp.part", "--output", "--surfaces"},
     {"record udp:127.0.0.1:0 --raw --output=@o.pcapng --stats=@o.pcapng", "--stats", "--output"},
+    {"record udp:127.0.0.1:0 --raw --output=@o.pcapng --stats=@o.pcapng.part", "--output", "--stats"},
+    {"record --repair @o.ply --stats=@o.ply", "--repair", "--stats"}, /* of o.ply.part */
+    {"record --repair @o.ply.part --stats=@o.ply", "--repair", "--stats"},
     {"run @scan.shs --stats=@o --truth=@./o", "--truth", "--stats"},
     {"run @scan.shs --config=@f.yaml --stats=@o", "links[0].path", "--stats"},
 };
@@ -165,6 +177,9 @@ static void begin(struct wire *wire)
     wire_write_text(wire, "f.yaml", text);
     wire_write_text(wire, "cloud.ply", "a cloud");
     wire_write_text(wire, "scan.shs", "a stream");
+    wire_write_text(wire, "k.ptx.part", "of a killed recorder");
+    wire_write_text(wire, "k.ptx.grid", "of a killed recorder");
+    wire_write_text(wire, "k.wdp.part", "of a killed recorder");
     wire_write_text(wire, "journal", "a journal");
     wire_write_text(wire, "path.csv", "a path");
     wire_write_text(wire, "list.txt", "0 0\n90 0\n");

@@ -26,4 +26,11 @@ struct record_line {
  * stay where it is. */
 int record_line_read(struct record_line *line, int argc, char **argv);
 
+/* ---- for record_line_read: other files of the line, which no option may name, too (app_check_files) */
+
+/* Adds what is written beside each file of -o. APP_OK, or APP_USAGE with the reason printed. */
+int record_line_add_files(struct record_line *line);
+/* Adds what each --repair reads and writes beside its file. APP_GO_ON, or APP_USAGE with the reason printed. */
+int record_line_add_repaired(struct record_line *line);
+
 #endif

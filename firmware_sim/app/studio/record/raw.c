@@ -134,7 +134,9 @@ int raw_record(int argc, char **argv)
     if (status == APP_GO_ON) status = read_source(r);
     if (status == APP_GO_ON) {
         app_catch_signals();
-        int rc = app_check_files(&r->in, NULL, &err);
+        const struct app_file part = {.option = "output", .path = r->path, .use = APP_WRITES, .added = ".part"};
+        int rc = app_add_file(&r->in, &part) == APP_OK ? app_check_files(&r->in, NULL, &err)
+                                                       : sh_fail(&err, SH_EINPUT, "too many files");
         if (rc == SH_OK) rc = raw_run(r, &err);
         status = rc == SH_OK ? APP_OK : app_fail(&err);
     }

@@ -215,39 +215,13 @@ static int check_repair(const struct record_line *r)
     return APP_GO_ON;
 }
 
-/* Lists the files that are written beside each file of -o: a file for each scan (--split, --each), the files that a
- * mesh names, and a .wdp. */
-static int add_names(struct record_line *r)
-{
-    static const struct {
-        const char *named, *ending;
-    } beside[] = {{".obj", ".mtl"},  {".obj", ".png"}, {".gltf", ".bin"},
-                  {".gltf", ".png"}, {".fbx", ".png"}, {".las", ".wdp"}};
-    const int n_files = r->in.n_files;
-    int file = 0, status = APP_OK;
-    for (int i = 0; i < n_files; i++) {
-        struct app_file *named = &r->in.file[i];
-        if (named->option == NULL || strcmp(named->option, "output") != 0) continue;
-        const struct recorder_ops *ops = r->job.files.file[file++].ops; /* both lists have the order of -o */
-        named->n_ending = strlen(ops->ending);
-        named->each = r->job.files.split || r->job.each;
-        for (size_t k = 0; k < sizeof beside / sizeof beside[0] && status == APP_OK; k++) {
-            struct app_file other = *named;
-            other.ending = beside[k].ending;
-            if (strcmp(other.ending, ".wdp") == 0 && !r->job.files.recorder.las_wdp) continue;
-            if (strcmp(ops->ending, beside[k].named) == 0) status = app_add_file(&r->in, &other);
-        }
-    }
-    return status;
-}
-
 int record_line_read(struct record_line *r, int argc, char **argv)
 {
     *r = (struct record_line){.job = {.recording = {.frames = -1}}, .long_edge = -1, .sparse_seed = -1};
     int status = app_parse(&app_record, argc, argv, &r->in, r);
     if (status != APP_GO_ON) return status;
     if (r->raw_only) return app_usage(&app_record, "--send, --relay, --ready-fd: allowed with --raw");
-    if (r->n_repairs > 0) return check_repair(r);
+    if (r->n_repairs > 0) return check_repair(r) == APP_GO_ON ? record_line_add_repaired(r) : APP_USAGE;
     if (r->job.files.n == 0 && r->job.stats == NULL) return app_usage(&app_record, "-o FILE is needed");
     if (is_config(r->in.operand[0]) && (r->job.recording.listen || r->job.wait_s > 0 || r->job.recording.replug_s > 0))
         return app_usage(
@@ -267,7 +241,7 @@ int record_line_read(struct record_line *r, int argc, char **argv)
     if (r->job.each && record_files_check_each(&r->job.files, &err) != SH_OK)
         return app_usage(&app_record, "%s", err.text);
     if (check_commands(r) != APP_OK || check_meshes(r) != APP_OK || check_options(r) != APP_OK ||
-        check_colours(r) != APP_OK || add_names(r) != APP_OK)
+        check_colours(r) != APP_OK || record_line_add_files(r) != APP_OK)
         return APP_USAGE;
     r->job.source = r->in.operand[0];
     r->job.recording.progress = !r->quiet;

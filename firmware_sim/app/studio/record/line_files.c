@@ -1,0 +1,73 @@
+/* SPDX-License-Identifier: MIT */
+/* The files that a line of `record` writes or reads without naming them. */
+#include <string.h>
+#include <unistd.h>
+
+#include "firmware_sim/app/studio/record/line.h"
+
+/* A file beside FILE, if FILE has the ending `of`. */
+struct beside {
+    const char *of, *ending;
+};
+
+/* In place of FILE's ending: the files that a mesh names, and the files of waveforms. */
+static const struct beside instead[] = {{".obj", ".mtl"}, {".obj", ".png"}, {".gltf", ".bin"},    {".gltf", ".png"},
+                                        {".fbx", ".png"}, {".las", ".wdp"}, {".las", ".wdp.part"}};
+/* After FILE's ending: what is renamed or removed at the end. */
+static const struct beside after[] = {{"", ".part"}, {".ptx", ".grid"}};
+
+enum { N_INSTEAD = sizeof instead / sizeof instead[0], N_AFTER = sizeof after / sizeof after[0] };
+
+static int add_beside(struct record_line *r, const struct app_file *named)
+{
+    int status = APP_OK;
+    for (size_t k = 0; k < N_INSTEAD && status == APP_OK; k++) {
+        struct app_file other = *named;
+        other.ending = instead[k].ending;
+        if (strcmp(other.ending, ".wdp") == 0 && !r->job.files.recorder.las_wdp) continue;
+        if (app_ends_in(named->path, instead[k].of)) status = app_add_file(&r->in, &other);
+    }
+    for (size_t k = 0; k < N_AFTER && status == APP_OK; k++) {
+        struct app_file other = *named;
+        other.added = after[k].ending;
+        if (app_ends_in(named->path, after[k].of)) status = app_add_file(&r->in, &other);
+    }
+    return status;
+}
+
+int record_line_add_files(struct record_line *r)
+{
+    const int n_files = r->in.n_files;
+    int file = 0, status = APP_OK;
+    for (int i = 0; i < n_files && status == APP_OK; i++) {
+        struct app_file *named = &r->in.file[i];
+        if (named->option == NULL || strcmp(named->option, "output") != 0) continue;
+        const struct recorder_ops *ops = r->job.files.file[file++].ops; /* both lists have the order of -o */
+        named->n_ending = strlen(ops->ending);
+        named->each = r->job.files.split || r->job.each;
+        status = add_beside(r, named);
+    }
+    return status;
+}
+
+/* FILE is the file that a repair makes of FILE.part, which it also takes as its operand. */
+int record_line_add_repaired(struct record_line *r)
+{
+    static const char part[] = ".part";
+    int status = APP_OK;
+    for (int i = 0; i < r->n_repairs && status == APP_OK; i++) {
+        const size_t n_part = app_ends_in(r->repair[i], part) ? strlen(part) : 0;
+        const struct app_file is = {.option = "repair", .path = r->repair[i], .n_ending = n_part, .use = APP_READS};
+        struct app_file other[] = {is, is, is, is};
+        other[0].ending = "";
+        other[0].use = APP_WRITES; /* only where it is not there: a repair replaces nothing */
+        other[1].ending = part;
+        other[2].ending = ".grid";
+        other[3].n_ending = n_part + strlen(".las");
+        other[3].ending = ".wdp.part";
+        const int is_there = n_part == 0 && access(is.path, F_OK) == 0;
+        for (int k = is_there ? 1 : 0; k < 4 && status == APP_OK; k++)
+            status = app_add_file(&r->in, &other[k]);
+    }
+    return status == APP_OK ? APP_GO_ON : APP_USAGE;
+}
