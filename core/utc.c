@@ -7,7 +7,7 @@
 
 #include "core/date.h"
 
-enum { DAY_S = 86400, FIRST_YEAR = 1972, LAST_YEAR = 2199 };
+enum { DAY_S = 86400 };
 static const int64_t GPS_EPOCH_TAI_S = 315964800 + 19; /* 1980-01-06 is day 3,657; TAI-UTC was 19 s */
 static const int64_t NTP_TO_POSIX_S = 2208988800;      /* 1900 to 1970: 70 years, 17 leap days */
 static const int64_t WEEK_NS = 604800 * UTC_SECOND_NS;
@@ -54,7 +54,7 @@ static int parse_line(const char *line, int number, struct utc_table *out, struc
 /* Returns 0 for a date that can't be the end of a table. The table is then refused, as 0 is before its last entry. */
 static int64_t parse_expiry(const char *text)
 {
-    const long long ntp_s = strtoll(text, NULL, 10), last_s = date_days(LAST_YEAR + 1, 1, 1) * DAY_S;
+    const long long ntp_s = strtoll(text, NULL, 10), last_s = date_days(UTC_LAST_YEAR + 1, 1, 1) * DAY_S;
     return ntp_s < NTP_TO_POSIX_S || ntp_s - NTP_TO_POSIX_S > last_s ? 0 : ntp_s - NTP_TO_POSIX_S;
 }
 
@@ -75,7 +75,7 @@ int utc_table_parse(const char *text, struct utc_table *out, struct sh_err *err)
     if (out->n == 0 || out->expires_s <= out->leap[out->n - 1].posix_s)
         return sh_fail(err, SH_EFORMAT,
                        "not a table of leap seconds that expires (#@) after its last entry and by the end of %d",
-                       LAST_YEAR);
+                       UTC_LAST_YEAR);
     return SH_OK;
 }
 
@@ -128,8 +128,9 @@ void utc_from_tai(const struct utc_table *table, int64_t tai_ns, struct utc_time
 
 int utc_to_tai(const struct utc_table *table, const struct utc_time *utc, int64_t *tai_ns, struct sh_err *err)
 {
-    if (utc->year < FIRST_YEAR || utc->year > LAST_YEAR)
-        return sh_fail(err, SH_EINPUT, "year %d is out of range; allowed %d to %d", utc->year, FIRST_YEAR, LAST_YEAR);
+    if (utc->year < UTC_FIRST_YEAR || utc->year > UTC_LAST_YEAR)
+        return sh_fail(err, SH_EINPUT, "year %d is out of range; allowed %d to %d", utc->year, UTC_FIRST_YEAR,
+                       UTC_LAST_YEAR);
     if (!date_exists(utc->year, utc->month, utc->day))
         return sh_fail(err, SH_EINPUT, "there is no %04d-%02d-%02d", utc->year, utc->month, utc->day);
     if (utc->hour < 0 || utc->hour > 23 || utc->minute < 0 || utc->minute > 59 || utc->second < 0 || utc->second > 60 ||

@@ -16,7 +16,7 @@
 
 #include "core/err.h"
 
-enum { UTC_MAX_LEAPS = 64, UTC_TEXT_LEN = 32 };
+enum { UTC_MAX_LEAPS = 64, UTC_TEXT_LEN = 32, UTC_FIRST_YEAR = 1972, UTC_LAST_YEAR = 2199 };
 
 #define UTC_SECOND_NS ((int64_t)1000000000)
 

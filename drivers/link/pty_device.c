@@ -90,9 +90,10 @@ static int symlink_look(const char *path, const char *slave, struct sh_err *err)
     if (n < 0) return symlink_errno(path, err);
     text[n] = '\0';
     if (strcmp(text, slave) == 0 || stat(path, &target) != 0 || is_left_over(text, &self, &target)) return 0;
+    const int is_slave = S_ISCHR(target.st_mode) && strncmp(text, "/dev/pts/", 9) == 0;
     return symlink_refuse(path,
-                          S_ISCHR(target.st_mode) ? "leads to a terminal in use by another program"
-                                                  : "leads to something that is not a terminal of this program",
+                          is_slave ? "leads to a terminal in use by another program"
+                                   : "leads to something that is not a terminal of this program",
                           err);
 }
 

@@ -111,12 +111,13 @@ static double peak_mb(void)
     return 1024e-6 * (double)usage.ru_maxrss;
 }
 
+/* Copies share the triangles of their mesh, so a triangle of a scene with many copies takes few bytes. */
 static void print_memory(const struct site *site, double all_mb, FILE *out)
 {
-    double bytes = bytes_of(site->scene, site->bvh), triangles = (double)scene_n_kept(site->scene);
+    double bytes = bytes_of(site->scene, site->bvh), triangles = (double)site->scene->n_all;
     for (uint32_t i = 0; i < site->n_movers; i++) {
         bytes += bytes_of(site->mover[i].scene, site->mover[i].bvh);
-        triangles += (double)scene_n_kept(site->mover[i].scene);
+        triangles += (double)site->mover[i].scene->n_all;
     }
     fprintf(out, "memory    %.4g MB for meshes and BVH, %.0f bytes a triangle; %.4g MB at the peak\n", 1e-6 * bytes,
             bytes / triangles, all_mb);

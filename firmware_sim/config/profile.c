@@ -16,6 +16,7 @@
 #include "firmware_sim/config/table/value.h"
 
 #include <dirent.h>
+#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -61,6 +62,17 @@ static void find_dirs(const char *config_file, struct profile_dirs *dirs)
                  cfg_dir_of(config_file, base));
     for (int i = 0; shared_path(i, "heads", dirs->dir[dirs->n]); i++)
         if (dirs->dir[dirs->n][0] != '\0') dirs->n++;
+}
+
+/* A folder that the user names and that can't be read must not let another folder's profile take its place. */
+static int check_given_dir(struct sh_err *err)
+{
+    const char *given = getenv("SCANHEAD_HEADS");
+    if (given == NULL || given[0] == '\0') return SH_OK;
+    DIR *dir = opendir(given);
+    if (dir != NULL) return closedir(dir), SH_OK;
+    return sh_fail(err, SH_EINPUT, "SCANHEAD_HEADS: %s: %s; allowed is a folder of head profiles, or none", given,
+                   strerror(errno));
 }
 
 int cfg_is_yaml(const char *name)
@@ -207,6 +219,8 @@ static int find_profile(struct cfg_reader *rd, struct config *cfg)
     int from_set = cfg_where(rd, cfg_find(&rd->table, "head.profile"), 0) == CFG_FROM_SET;
     find_dirs(cfg->file, &dirs);
     int by_path = cfg_is_yaml(cfg->profile_file);
+    struct sh_err why;
+    if (!by_path && check_given_dir(&why) != SH_OK) return cfg_fail_key(rd, "head.profile", "%s", why.text);
     if (!by_path && strchr(cfg->profile_file, '/') != NULL) return fail_lookup(rd, cfg, &dirs);
     for (int i = 0; i < (by_path ? 1 : dirs.n); i++) {
         if (!by_path)
@@ -240,6 +254,7 @@ int config_load_profile(const char *name, const char *config_file, struct config
     struct cfg_reader rd;
     struct config_diagnostics diagnostics = {0};
     char path[2 * CONFIG_PATH_LEN], allowed[CFG_ALLOWED_MAX + 16];
+    if (check_given_dir(err) != SH_OK) return err->code;
     find_dirs(config_file, &dirs);
     for (int i = 0; i < dirs.n; i++) {
         snprintf(path, sizeof path, "%s/%s.yaml", dirs.dir[i], name);
@@ -270,6 +285,7 @@ int config_list_profiles(const char *dir, FILE *out, struct sh_err *err)
 {
     struct profile_dirs dirs;
     if (dir == NULL) {
+        if (check_given_dir(err) != SH_OK) return err->code;
         find_dirs(NULL, &dirs);
         for (int i = 0; i < dirs.n && dir == NULL; i++)
             if (access(dirs.dir[i], R_OK) == 0) dir = dirs.dir[i];

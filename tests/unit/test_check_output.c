@@ -104,6 +104,29 @@ static void a_plain_scene(void **state)
     free(text);
 }
 
+/* Each of 1000 copies has the 3 triangles of the mesh, which is kept once. */
+static void memory_is_that_of_a_triangle_of_the_scene(void **state)
+{
+    (void)state;
+    char set[200], *copies = malloc(20000);
+    double mb, each;
+    assert_non_null(copies);
+    int n = snprintf(copies, 20000, "x_m,y_m,z_m\n");
+    for (int i = 0; i < 1000; i++)
+        n += snprintf(copies + n, 20000 - (size_t)n, "%d,0,0\n", 100 * i);
+    write_scene(0, 0, 0);
+    write_in("copies.csv", copies);
+    free(copies);
+    snprintf(set, sizeof set, "scene.meshes[0].copies=%.*s/copies.csv", (int)(strrchr(config_path, '/') - config_path),
+             config_path);
+    char *text = checked(ONE, (const char *const[]){set, NULL});
+    has(text, "scene     3000 triangles, 2 surfaces, 1000 copies (3 triangles are kept), ...");
+    assert_int_equal(
+        sscanf(strstr(text, "\nmemory "), " memory %lf MB for meshes and BVH, %lf bytes a triangle;", &mb, &each), 2);
+    assert_true(fabs(3000.0 * each - 1e6 * mb) <= 1500.0 + 1e3 * mb);
+    free(text);
+}
+
 /* A window has 28 bytes and two for each sample, of an even number: 84 bytes, 20,000 times in a second. */
 static void waveforms(void **state)
 {
@@ -367,6 +390,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_plain_scene),
+        cmocka_unit_test(memory_is_that_of_a_triangle_of_the_scene),
         cmocka_unit_test(waveforms),
         cmocka_unit_test(two_scanners),
         cmocka_unit_test(scanners_with_other_counts),

@@ -106,6 +106,12 @@ static const struct {
     {AT_16("time: {epoch: noon}"), 16, "time.epoch",
      "\"noon\": not a time as 2026-01-01T00:00:00Z, with up to 9 decimals; allowed none, utc, tai, or a time after "
      "1980-01-06 such as 2026-01-01T00:00:00Z"},
+    {AT_16("time: {epoch: 1970-01-01T00:00:00Z}"), 16, "time.epoch",
+     "\"1970-01-01T00:00:00Z\": not after 1980-01-06T00:00:00Z, where GPS time begins; allowed none, utc, tai, or a time "
+     "after 1980-01-06 such as 2026-01-01T00:00:00Z"},
+    {AT_16("time: {epoch: 2200-01-01T00:00:00Z}"), 16, "time.epoch",
+     "\"2200-01-01T00:00:00Z\": after 2199-12-31; allowed none, utc, tai, or a time after 1980-01-06 such as "
+     "2026-01-01T00:00:00Z"},
     {AT_16("gnss: {rate_hz: 3}"), 16, "gnss.rate_hz", "3 is not a rate of the receiver; allowed 1, 2, 4, 5, 10 or 20 Hz"},
     {AT_16("gnss: {quality: 3}"), 16, "gnss.quality",
      "3 is not a fix of position; allowed 0 none, 1 autonomous, 2 differential, 4 RTK fixed, 5 RTK float"},

@@ -193,7 +193,15 @@ static void one_folder_is_listed(void **state)
     expect_list("config/heads", 1, "mine: scanhead cany rate\n");
     unlink("empty/other.yaml");
     expect_list(NULL, 0, "");
-    setenv("SCANHEAD_HEADS", "/nonexistent", 1);
+    static struct config_profile profile;
+    static const char why[] = "SCANHEAD_HEADS: /nonexistent: No such file or directory; allowed is a folder of head ";
+    setenv("SCANHEAD_HEADS", "/nonexistent", 1); /* though config/heads has profiles */
+    expect_list(NULL, SH_EINPUT, why);
+    assert_int_equal(config_load_profile("mine", NULL, &profile, &err), SH_EINPUT);
+    assert_int_equal(strncmp(err.text, why, strlen(why)), 0);
+    assert_int_equal(load_edited("any-rate", "mine"), SH_EINPUT);
+    assert_says("head.profile: SCANHEAD_HEADS: /nonexistent: No such file or directory; ");
+    setenv("SCANHEAD_HEADS", "", 1);
     expect_list(NULL, 1, "mine: scanhead c");
     expect_list("/nonexistent", SH_EINPUT, "/nonexistent: cannot be read; a directory of head profiles is needed");
     assert_int_equal(chdir("empty"), 0);

@@ -72,6 +72,37 @@ static void names_and_numbers_of_one_character_are_kept(void **state)
     assert_string_equal(cfg->link[0].whose, ""); /* its serial is its own */
 }
 
+/* An empty value takes back a text that is empty by default: the key counts as not given. Others keep their text. */
+static void an_empty_text_is_not_given(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *sets[MOST_SETS];
+        const char *says; /* after "--set "; NULL: it loads */
+    } cases[] = {
+        {{"head.settings_file=f", "head.name=n", "head.settings_file=", "head.name="}, NULL},
+        {{"head.settings_file="}, NULL},
+        {{"waveform.pulse=gaussian", "waveform.pulse_file=p", "waveform.pulse_file="}, NULL},
+        {{"stations.0.scanner.head.name=n", "stations.0.scanner.head.name="}, NULL},
+        {{"head.serial="},
+         "head.serial: \"\" is empty; allowed text of 1 to 31 bytes, printable ASCII without comma, "
+         "';' and quotes"},
+        {{"scene.target.objects=[a]", "scene.target.objects.0="}, "scene.target.objects[0]: \"\" is empty; "},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        char want[400];
+        const int code = load_these(cases[i].sets);
+        if (cases[i].says == NULL) {
+            assert_loads(code);
+            assert_string_equal(cfg->head.settings_file, "");
+            assert_string_equal(cfg->head.name, "");
+            continue;
+        }
+        snprintf(want, sizeof want, "--set %s", cases[i].says);
+        if (code != SH_EINPUT || strncmp(err.text, want, strlen(want)) != 0) fail_msg("%zu: %s", i, err.text);
+    }
+}
+
 /* A text may have as many bytes as the error says, and no more. A path of a file counts with its folder. */
 static void the_longest_texts(void **state)
 {
@@ -135,6 +166,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(one_character_is_a_text),
         cmocka_unit_test(names_and_numbers_of_one_character_are_kept),
+        cmocka_unit_test(an_empty_text_is_not_given),
         cmocka_unit_test(the_longest_texts),
         cmocka_unit_test(the_longest_path_of_a_configuration),
     };

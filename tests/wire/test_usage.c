@@ -190,7 +190,8 @@ static void test_links(void **state)
 {
     struct wire *wire = *state;
     usage_complaints = 0;
-    char link[128];
+    char link[128], pts[64];
+    int master;
     room_write(wire);
     wire_write_text(wire, "plain", "keep me\n");
     expect_link(wire, "symlink path that is a file", "{type: pty, path: plain}", 2,
@@ -198,6 +199,15 @@ static void test_links(void **state)
     char *kept = wire_read(wire_path(wire, "plain"), NULL);
     assert_string_equal(kept, "keep me\n");
     free(kept);
+    assert_int_equal(symlink("/dev/null", wire_path(wire, "device")), 0);
+    expect_link(wire, "symlink to a device", "{type: pty, path: device}", 2,
+                "device: exists and leads to something that is not a terminal of this program");
+    master = posix_openpt(O_RDWR | O_NOCTTY);
+    assert_true(master >= 0 && unlockpt(master) == 0 && ptsname_r(master, pts, sizeof pts) == 0);
+    assert_int_equal(symlink(pts, wire_path(wire, "taken")), 0);
+    expect_link(wire, "symlink to a terminal", "{type: pty, path: taken}", 2,
+                "taken: exists and leads to a terminal in use by another program");
+    close(master);
     expect_link(wire, "symlink in no folder", "{type: pty, path: none/port}", 2, "none/port");
     expect_link(wire, "file in no folder", "{type: file, path: none/x}", 2, "none/x");
     expect_link(wire, "file that is a folder", "{type: file, path: .}", 2, "irectory");

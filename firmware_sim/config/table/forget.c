@@ -39,7 +39,7 @@ void cfg_forget_list(struct cfg_reader *rd, const char *path)
     *cfg_list_count(rd, list) = 0;
 }
 
-static void forget_value(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item)
+void cfg_forget_value(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item)
 {
     const size_t row = cfg_row(rd, key);
     rd->line[row][item] = 0;
@@ -55,7 +55,7 @@ void cfg_forget(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item)
         if (row->type == CFG_LIST)
             cfg_forget_list(rd, row->path);
         else if (cfg_list_of(&rd->table, row) == cfg_list_of(&rd->table, key)) /* else dropped with its list */
-            forget_value(rd, row, item);
+            cfg_forget_value(rd, row, item);
     }
     if (strncmp(key->path, "stations[]", 10) == 0 && cfg_is_in("stations[].scanner", key->path))
         ((struct config_station *)cfg_address(rd, cfg_find(&rd->table, "stations[].scanner"), item))->has_scanner = 0;

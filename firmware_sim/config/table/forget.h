@@ -19,6 +19,8 @@ void cfg_take_over(struct cfg_reader *rd, const struct cfg_key *key);
 void cfg_end_scanner(struct cfg_reader *rd);
 /* Resets a list as if it had not been given. */
 void cfg_forget_list(struct cfg_reader *rd, const char *path);
+/* Does the same for the value of one key. */
+void cfg_forget_value(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item);
 /* Does the same for a list, a section, or an element of a list. */
 void cfg_forget(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item);
 

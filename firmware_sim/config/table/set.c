@@ -173,6 +173,15 @@ static void replace(struct cfg_reader *rd, struct cfg_document *doc, const struc
     rd->set = NULL;
 }
 
+/* Whether an empty value takes the key back: it is a text or a path that is empty where it isn't given. An element of a
+ * list always has a value. */
+static int can_be_empty(const struct cfg_key *key)
+{
+    const size_t len = strlen(key->path);
+    return (key->type == CFG_TEXT || key->type == CFG_PATH) && key->def != NULL && key->def[0] == '\0' &&
+           strcmp(key->path + len - 2, "[]") != 0;
+}
+
 /* n_before: how many --set came before it. */
 static void apply_set(struct cfg_reader *rd, struct cfg_document *doc, const char *text, int n_before)
 {
@@ -197,6 +206,10 @@ static void apply_set(struct cfg_reader *rd, struct cfg_document *doc, const cha
         return;
     }
     if (is_scanners) cfg_take_over(rd, key);
+    if (equals[1] == '\0' && can_be_empty(key)) {
+        cfg_forget_value(rd, key, set.item);
+        return;
+    }
     rd->line[cfg_row(rd, key)][set.item] = CFG_FROM_SET;
     cfg_store(rd, key, set.item, CFG_FROM_SET, equals + 1, "");
 }

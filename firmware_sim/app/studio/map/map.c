@@ -372,8 +372,8 @@ static const struct app_option OPTIONS[] = {
      .help = "place in the picture's middle (default: the middle of the points)"},
     {APP_NUMBER, "fov-deg", "DEG", .min = 1, .max = 160, .at = AT(view.fov_deg),
      .help = "field of view, across the width (default 40)"},
-    {APP_TEXT, "size", "WxH", .at = AT(view.size), .help = "size of the picture in pixels, up to 4096x4096 (default "
-                                                           "1200x800)"},
+    {APP_TEXT, "size", "WxH", .at = AT(view.size), .help = "size of the picture in pixels, 16777216 in all at most, as "
+                                                           "in 4096x4096 (default 1200x800)"},
     {APP_TEXT, "colour", "WHAT", .at = AT(view.colour), OPTION_CHOICES(map_view_colours),
      .help = "colours to show: height (default), range, reflectance, label, station, rgb (of a recording, or "
              "output.colour)"},

@@ -96,6 +96,7 @@ static int udp_open(struct raw *r, struct sh_err *err)
         const size_t at = strlen(r->endpoint);
         snprintf(r->endpoint + at, sizeof r->endpoint - at, ",%s", strrchr(udp->port[i].name, ':') + 1);
     }
+    if (rc == SH_OK && !r->quiet) fprintf(stderr, "scanhead: datagrams are taken at %s\n", r->endpoint);
     return rc;
 }
 
