@@ -108,7 +108,7 @@ static void take_frame(void *protocol, const uint8_t *frame, size_t len)
         self->spec.host.count(self->spec.host.ctx, PROTOCOL_UNITS_LOST, news.broken);
 }
 
-/* A scan shows by itself what it lacks. */
+/* A scan shows by itself what it lacks; an event does not. */
 static void take_gap(void *protocol, uint32_t n_frames)
 {
     (void)n_frames;

@@ -53,7 +53,7 @@ struct cola {
         int64_t lines_uhz;
         uint32_t steps;
     } next;
-    int rests;       /* the stream said last that the head does not scan, so its scans have all come; or it has gaps */
+    int rests;       /* the stream said last that the head does not scan: its scans have all come */
     uint32_t field;  /* number in the name of the request at hand, field012 */
     int outputs_due; /* LIDoutputstate is sent once, after the answer */
     struct {         /* the events that the client switched on, and the set of fields that is watched */

@@ -118,8 +118,8 @@ static enum cola_error set_head(struct cola *self)
     return COLA_OK;
 }
 
-/* Stops the head where it scans. Scans that it had made by then still come while it spins down. Returns 1 once there are
- * none; 0: not yet; -1: it may not be stopped. */
+/* Stops the head where it scans. Scans that it had made by then still come while it spins down. Returns 1 once there
+ * are none; 0: not yet; -1: it may not be stopped. */
 static int come_to_rest(struct cola *self)
 {
     const enum protocol_head_state state = protocol_ask_state(&self->spec.host);
@@ -161,7 +161,7 @@ enum cola_error cola_set_scan_cfg(struct cola *self, struct cola_args *args, str
 
 void cola_geometry_event(struct cola *self, const struct native_event *event)
 {
-    if (event != NULL && event->code != NATIVE_EV_STATE) return;
+    if (event == NULL ? !self->next.is_due : event->code != NATIVE_EV_STATE) return;
     self->rests = event == NULL || (event->a != PROTOCOL_HEAD_SPIN_UP && event->a != PROTOCOL_HEAD_SCANNING);
 }
 

@@ -139,7 +139,8 @@ static int set_phase_lock(const struct posted *p, const char *value)
     return command(p, on ? "HEAD:PHASE:LOCK ON" : "HEAD:PHASE:LOCK OFF");
 }
 
-/* Reads a decimal number from 0 to below the limit, which is half a step above the largest that is allowed. Returns 1, or 0 if it is none. */
+/* Reads a decimal number from 0 to below the limit, which is half a step above the largest that is allowed. Returns 1,
+ * or 0 if it is none. */
 static int read_decimal(const char *s, double limit, double *out)
 {
     char *end;

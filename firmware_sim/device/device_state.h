@@ -48,8 +48,8 @@ struct device_machine {
         enum head_state state;
     } change[DEVICE_MAX_CHANGES];
     uint32_t n_changes; /* in the whole run, power cycles included */
-    /* A command ended the movement that changes with a lower number tell of. Clients see that at once, though ticks that
-     * are claimed already still have the scan's pulses. */
+    /* A command has ended the movement of changes with a lower number. Clients see that at once, though ticks that are
+     * claimed already still have the scan's pulses. */
     uint32_t n_stopped;
 };
 

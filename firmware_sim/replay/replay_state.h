@@ -48,8 +48,8 @@ struct replay {
         enum head_state state;
     } change[REPLAY_CHANGES];
     uint32_t n_changes;
-    /* 0, or the changes up to and including the one with which a command last ended the playing, or began it. Clients see
-     * such a command at once, ticks before that change. */
+    /* 0, or the changes up to and including the one with which a command last ended the playing, or began it. Clients
+     * see such a command at once, ticks before that change. */
     uint32_t stopped, begun;
     struct sh_err failure; /* code 0: none */
     /* Time of day at device time 0 of the run, ns since 1970. The first round sets it so that frames have the time

@@ -145,12 +145,14 @@ static void a_scan_is_stopped_first(void **state)
     cola_expect("sMN mLMPsetscancfg" FAST, "sFA 4");
 }
 
-/* Another session has stopped the head, and starts it again. Where the event has passed before, an idle head answers. */
+/* Another session has stopped the head, and starts it again. Where the event has passed before, the answer comes when
+ * the head is idle. */
 static void a_head_that_is_started_again_is_stopped_again(void **state)
 {
     (void)state;
     open_lms();
     is_set("spin-down", "25", "0.25");
+    cola.ops->gap(cola.protocol, 1); /* before the request: no event was waited for */
     protocol_rig_clear(&cola);
     cola_input("\2sMN mLMPsetscancfg" FAST "\3", strlen("\2sMN mLMPsetscancfg" FAST "\3"));
     cola.ops->time(cola.protocol, 1000000);

@@ -95,7 +95,7 @@ static int events_of(struct replay *r, uint64_t number)
     return n;
 }
 
-/* The state is that of the last released tick. */
+/* The state is that of the last released tick, or spin-up where the recording is about to play. */
 static void expect_state(struct replay *r, uint64_t released, const char *state)
 {
     struct command_result result;
@@ -132,7 +132,7 @@ static void it_waits_for_its_clients(void **state)
     expect_state(r, 2, "idle");
     replay_source.session_opened(r, 4, "tcp c");
     assert_int_equal(events_of(r, 2), 1);
-    expect_state(r, 2, "idle"); /* the tick that begins it has number 2, and is not released yet */
+    expect_state(r, 2, "spin-up"); /* the tick that begins it has number 2, and is not released yet */
     expect_state(r, 3, "scanning");
     assert_int_equal(events_of(r, 3), 1);
     replay_stop(r, 4, 0);

@@ -217,7 +217,7 @@ static void a_command_seeks_paces_and_loops(void **state)
     free(cfg);
 }
 
-/* A replay is released up to tick 0 all the time, and ticks ahead of it are made. The state follows commands at once. */
+/* Ticks are made ahead, and none of them is released. The state follows commands at once. */
 static void a_command_is_seen_at_once(void **state)
 {
     (void)state;
