@@ -5,6 +5,7 @@
 #include <malloc.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -72,13 +73,36 @@ static int main_run(int argc, char **argv)
     return fail_unknown(argv[1]);
 }
 
+enum { STACK_ROOM = 512 * 1024 };
+
+/* In a function of its own: the calls of the function that has this frame would touch the stack below the frame. */
+static __attribute__((noinline)) int touch_stack(void)
+{
+    volatile char stack[STACK_ROOM];
+    stack[0] = APP_OK;
+    return stack[0];
+}
+
+/* The first thread's stack grows where it is touched. A limit of address space (ulimit -v) would end the program by a
+ * signal then, anywhere. So the stack gets its room at the start. It takes no memory until it is used. */
+static int reserve_stack(void)
+{
+    void *room = mmap(NULL, STACK_ROOM, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    if (room == MAP_FAILED) {
+        app_say("no memory for the stack");
+        return APP_FAILED;
+    }
+    munmap(room, STACK_ROOM);
+    return touch_stack();
+}
+
 /* Configurations and blocks of pulses lie on stacks. Each thread's stack is as large as this limit. In trials 384 KiB
  * were enough. */
 static int check_stack(void)
 {
     enum { NEEDED_KIB = 1024 };
     struct rlimit limit;
-    if (getrlimit(RLIMIT_STACK, &limit) != 0 || limit.rlim_cur >= NEEDED_KIB * 1024) return APP_OK;
+    if (getrlimit(RLIMIT_STACK, &limit) != 0 || limit.rlim_cur >= NEEDED_KIB * 1024) return reserve_stack();
     app_say("the stack is limited to %llu KiB; allowed %d and more: ulimit -s %d",
             (unsigned long long)limit.rlim_cur / 1024, NEEDED_KIB, NEEDED_KIB);
     return APP_USAGE;
@@ -111,11 +135,26 @@ static void own_pipes(void)
     }
 }
 
+/* std::set_terminate of C++, by the name that all compilers for Linux give it. */
+void (*set_terminate(void (*handler)(void)))(void) __asm__("_ZSt13set_terminatePFvvE");
+
+/* Threads of Embree's scheduler (TBB) throw where memory or a thread is refused, and nothing catches that. The program
+ * can't go on then. It ends with a line, as for other lack of memory, and not by abort(). */
+static void end_of_library(void)
+{
+    dprintf(STDERR_FILENO,
+            "%s: a library (Embree) got no memory or no thread; raise the limits (ulimit -v, ulimit -u), or take a "
+            "smaller scene\n",
+            app_program);
+    _exit(APP_FAILED);
+}
+
 /* A command's output may still be in the buffer. A full disk or a closed pipe shows only here. */
 int main(int argc, char **argv)
 {
     hold_streams();
     own_pipes();
+    set_terminate(end_of_library);
     /* malloc would raise this threshold with each large block that is freed, and then keep memory of meshes. */
     mallopt(M_MMAP_THRESHOLD, 4 << 20);
 #ifdef HEAD_ALONE

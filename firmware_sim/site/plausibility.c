@@ -276,8 +276,8 @@ static int check_stations(const struct site *site, const struct sh_report *repor
     return rc;
 }
 
-/* Warns of the first station far outside of the grid that the scene's coordinates are said to be in. Mostly the scene has
- * coordinates of its own, near 0. The limits of UTM and UPS are those of MGRS (GeographicLib, UTMUPS), with a wide
+/* Warns of the first station far outside of the grid that the scene's coordinates are said to be in. Mostly the scene
+ * has coordinates of its own, near 0. The limits of UTM and UPS are those of MGRS (GeographicLib, UTMUPS), with a wide
  * overlap between zones. */
 static void check_grid(const struct site *site, const struct sh_report *report)
 {

@@ -97,7 +97,8 @@ static void test_heading(void **state)
 }
 
 /* config/moving.md explains the curve with these points and figures. Three points define a parabola: after 0, 2 and 3 s
- * x is -1, 1 and 1, and y is 0, 0 and 1. Rests change no place. Two more points about the turn keep the platform on the lines. */
+ * x is -1, 1 and 1, and y is 0, 0 and 1. Rests change no place. Two more points about the turn keep the platform on the
+ * lines. */
 static void test_the_manual_s_turn(void **state)
 {
     (void)state;

@@ -157,6 +157,7 @@ static void too_many_are_refused(void **state)
     expect_error("/sparse", "", "per_m2 is needed: numbers from 1e-06 to 1000000000");
     expect_error("/sparse", "per_m2=1&scan=3", "scan=3: allowed whole numbers from 0 to 2");
     expect_error("/sparse", "per_m2=1&seed=1.5", "seed=1.5: allowed whole numbers from 0 to 1000000000");
+    expect_error("/sparse", "per_m2=1&seed=0x10", "seed=0x10: allowed whole numbers from 0 to 1000000000");
     expect_error("/sparse", "per_m2=1&per_m2=2", "per_m2: given twice; allowed once");
     expect_error("/sparse", "per=1", "per: unknown; allowed per_m2 long_edge scan seed first count");
     expect_error("/mesh", "", "scan is needed: whole numbers from 1 to 2");

@@ -64,6 +64,39 @@ static void check_memory(char *told)
     free(told);
 }
 
+/* Runs the program with so much address space. Returns its status. */
+static int run_within(struct wire *wire, int kib, const char *words)
+{
+    char command[1024];
+    snprintf(command, sizeof command, "ulimit -c 0; ulimit -v %d && exec '%s' %s", kib, wire_program(), words);
+    const char *const args[] = {"-c", command, NULL};
+    return wire_wait(wire, wire_spawn_program(wire, "/bin/sh", args, "out", "err", -1));
+}
+
+/* Too little address space ends in one line, also where memory or a thread is refused within Embree's scheduler, which
+ * throws, or where the stack has to grow. Limits too small for --version are left out: the system loads nothing. */
+static void little_memory_ends_in_a_line(void **state)
+{
+#ifdef SH_SANITIZE
+    skip(); /* a sanitizer needs more address space than that */
+#endif
+    struct wire *wire = *state;
+    char words[400];
+    int n_refused = 0;
+    room_write(wire);
+    snprintf(words, sizeof words, "check '%s'", wire_write_text(wire, "good.yaml", USAGE_GOOD));
+    for (int kib = 48000; kib <= 84000; kib += 1000) {
+        if (run_within(wire, kib, "--version") != 0) continue;
+        const int status = run_within(wire, kib, words);
+        char *err = wire_read(wire_path(wire, "err"), NULL), *end = strchr(err, '\n');
+        n_refused += status != 0;
+        if (status != 0 && (status != 1 || strncmp(err, "scanhead: ", 10) != 0 || end == NULL || end[1] != '\0'))
+            fail_msg("%d KiB: status %d: %s", kib, status, err);
+        free(err);
+    }
+    print_message("# %d limits of address space were too small for a check\n", n_refused);
+}
+
 /* The example passes `check` without a message, so each of its keys is known. */
 static void test_example(void **state)
 {
@@ -269,6 +302,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_objects_by_pipe, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_transparent, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_colours_in_part, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(little_memory_ends_in_a_line, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_example, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_links_as_run, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_file_stays, wire_setup, wire_teardown),

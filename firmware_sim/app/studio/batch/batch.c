@@ -120,8 +120,8 @@ static struct app_option OPTIONS[APP_MAX_OPTIONS + 1] = {
     {APP_TEXT, "stations", "all|LIST", .at = AT(stations_text),
      .help = "the stations, or the stops of the platform, as in 1,3-5 (default all)"},
     {APP_TEXT, "format", "A,B,...", .at = AT(format), .help = "endings of files, as for record (default ply)"},
-    {APP_FLAG, "list", NULL, .at = AT(list), .help = "print the jobs without doing them; with -o also which are done, by the sizes of "
-             "their files"},
+    {APP_FLAG, "list", NULL, .at = AT(list),
+     .help = "print the jobs without doing them; with -o also which are done, by the sizes of their files"},
     {APP_FLAG, "json", NULL, .at = AT(json), .help = "with --list: as JSON"},
     {APP_TEXT, "shard", "I/N", .at = AT(shard_text), .help = "only every N-th job, from the I-th on (default 1/1: all)"},
     {APP_FLAG, "merge", NULL, .at = AT(merge),

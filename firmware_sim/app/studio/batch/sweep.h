@@ -25,7 +25,8 @@ struct batch_sweeps {
 };
 
 /* Adds KEY=A,B,... or KEY=FIRST:LAST:STEP: whole steps from FIRST, not beyond LAST. Numbers are decimal, of up to
- * 15 digits; or whole, of up to 64 bits each. Commas within brackets, braces and quotes belong to a value. A key or a value that is given twice is an error. */
+ * 15 digits; or whole, of up to 64 bits each. Commas within brackets, braces and quotes belong to a value. A key or a
+ * value that is given twice is an error. */
 int batch_sweeps_add(struct batch_sweeps *sweeps, const char *text, struct sh_err *err);
 void batch_sweeps_free(struct batch_sweeps *sweeps);
 
