@@ -81,8 +81,7 @@ static void drift(void **state)
             int64_t wanted_ns = 700000000 + i * UTC_SECOND_NS, ppt = llround(ppm[k] * 1e6);
             int64_t about_ns = (int64_t)((long double)wanted_ns / (1 + (long double)ppt / 1e12L));
             int64_t t_ns = about_ns - 3;
-            for (;;
-                 t_ns++) { /* floor(t d) in 128 bits; 1000 s are added, so that the division rounds down */
+            for (;; t_ns++) { /* floor(t d) in 128 bits; 1000 s are added, so that the division rounds down */
                 i128 product = (i128)t_ns * ppt + (i128)1000000000000 * 1000000000000;
                 if (t_ns + (int64_t)(product / 1000000000000 - 1000000000000) >= wanted_ns) break;
             }

@@ -121,7 +121,7 @@ export class Past {
   }
 
   // Reads /past up to the live frames that were left to it. Before the first live frame nothing says how much there is,
-  // and a head at rest at the pace `fast` sends none. Then the page goes on asking, since the head's observer may be late.
+  // and a head at rest at the pace `fast` sends none. Then the page goes on asking: the head's observer may be late.
   async #read() {
     if (this.#isReading || this.#url === null) return;
     this.#isReading = true;
