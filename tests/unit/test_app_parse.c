@@ -60,7 +60,7 @@ static char line[70000];
 /* Parses words that are apart by blanks. */
 static int parse(const char *words)
 {
-    static char *argv[2 * APP_MAX_SETS + 16];
+    static char *argv[2 * APP_MAX_FILES + 16];
     char *at = line;
     int argc = 0;
     memset(&v, 0, sizeof v);
@@ -193,10 +193,10 @@ static void lists_have_an_end(void **state)
     assert_int_equal(parse(repeated(" --set x=1", 256)), APP_GO_ON);
     assert_int_equal(in.sets.n, 256);
     refuses(repeated(" --set x=1", 257), "scanhead: too many settings; at most 256\n");
-    assert_int_equal(parse(repeated(" --call f", 126)), APP_GO_ON); /* and two operands */
-    assert_int_equal(in.n_files, 128);
-    refuses(repeated(" --call f", 127), "scanhead: too many files; at most 128\n");
-    refuses(repeated(" --call f", 129), "scanhead: too many files; at most 128\n");
+    assert_int_equal(parse(repeated(" --call f", 510)), APP_GO_ON); /* and two operands */
+    assert_int_equal(in.n_files, 512);
+    refuses(repeated(" --call f", 511), "scanhead: too many files; at most 512\n");
+    refuses(repeated(" --call f", 513), "scanhead: too many files; at most 512\n");
 }
 
 static void words_are_passed_on(void **state)
