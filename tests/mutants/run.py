@@ -47,7 +47,7 @@ class Judge:
 
     def __init__(self, reach, shipped, sanitized):
         self.tree, self.reach, self.shipped, self.sanitized, self.passing = shipped.tree, reach, shipped, sanitized, {}
-        self.commands = trees.tests_of_commands()
+        self.commands, self.ended = trees.tests_of_commands(), []
         self.workers = queue.SimpleQueue()
         for i in range(self.tree.jobs):
             self.workers.put(f"{self.tree.path}/build/worker-{i}")
@@ -64,6 +64,7 @@ class Judge:
             shutil.rmtree(worker, ignore_errors=True)
             self.tree.remove_strays()
             self.workers.put(worker)
+        self.ended.append(mutant)
         return mutant
 
     def judge(self, mutant, worker):
@@ -210,19 +211,20 @@ def builds(tree):
 
 
 def run(asked, mutants):
-    tree, done = trees.Tree(asked.build, asked.jobs), []
+    tree, done, judge = trees.Tree(asked.build, asked.jobs), [], None
     try:
         shipped, sanitized = builds(tree)
-        for mutant in judged(Judge(Reach(shipped, say), shipped, sanitized), mutants, asked.n):
+        judge = Judge(Reach(shipped, say), shipped, sanitized)
+        for mutant in judged(judge, mutants, asked.n):
             done.append(mutant)
             counted = sum(one["is"] in JUDGED for one in done)
             say(f"[{counted:3}/{asked.n}] {mutant['is']:10} {shown(mutant)}{'  by ' + mutant['by'][0] if mutant['is'] == 'found' else ''}")
         return report(done, asked.seed)
     finally:
         tree.children.end_all()
-        if done:
+        if judge is not None:  # a run that is stopped also keeps those that were judged out of turn
             with open(f"{tree.work}/{asked.seed}.json", "w", encoding="utf-8") as file:
-                json.dump({"seed": asked.seed, "mutants": done}, file, indent=1)
+                json.dump({"seed": asked.seed, "mutants": done + [mutant for mutant in judge.ended if mutant not in done]}, file, indent=1)
 
 
 def main():
