@@ -265,7 +265,8 @@ static void set_time(const struct site *site, uint32_t k, struct site_station *s
     s->t_s = s->frame / p->frames_per_s;
 }
 
-/* Digits that tell the numbers of all stops from each other: nine, or as many as the step between two needs. */
+/* Digits that tell the numbers of all stops from each other: nine, or as many as the step between two needs. The last
+ * digit is worth at most half a step, since numbers at the same distance from two others may be rounded to one. */
 static int count_digits(const struct site *site)
 {
     const struct config_platform *p = &site->cfg->platform;
@@ -273,7 +274,7 @@ static int count_digits(const struct site *site)
     int digits = 9;
     if (!(p->frames_per_s > 0.0)) return digits;
     const double whole = floor(log10(p->first_frame + (n_times - 1) * p->frame_step)) + 1.0;
-    while (digits < 17 && pow(10.0, whole - digits) > p->frame_step)
+    while (digits < 17 && pow(10.0, whole - digits) > 0.5 * p->frame_step)
         digits++;
     return digits;
 }

@@ -268,7 +268,7 @@ def report(sheet, args, heads, threads, recorder, clock, seconds):
     s = main_head.stats
     fired, got = s["fired_pulses"], record["pulses"]  # pulses that the head lost were fired, too
     lost, missing = record["lost_pulses"], record["missing_pulses"]
-    sheet.line(got + lost + missing == fired, "recorder: got + lost by head + left out for it = due",
+    sheet.line(missing is not None and got + lost + missing == fired, "recorder: got + lost by head + left out for it = due",
                f"{got} + {lost} + {missing} = {fired}")
     due = (clock.scan_ns[scanhead.EV_SCAN_END] - clock.scan_ns[scanhead.EV_SCAN_START]) * PRR_HZ // 10**9
     tick = TICK_NS * PRR_HZ // 10**9

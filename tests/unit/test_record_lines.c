@@ -35,8 +35,7 @@ static const struct lines_row POINTS[] = {
     {"--frames: a recorded stream has the scans that it has; allowed with a CONFIG, and with a head on a wire "
      "without --listen",
      {"record a.pcapng -o a.ply --frames 0"}},
-    {"--duration: a recorded stream has the scans that it has; allowed with a CONFIG, and with a head on a wire "
-     "without --listen",
+    {"--duration: a recorded stream has the scans that it has; allowed with a CONFIG, and with a head on a wire",
      {"record a.shs -o a.ply --duration 0.01", "record a.pcapng -o a.ply --listen --duration 1"}},
     {"--station: --listen sends no command; allowed with a CONFIG, and with a head on a wire without --listen",
      {"record tcp:a:1 -o a.ply --listen --station 2"}},

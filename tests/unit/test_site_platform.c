@@ -187,6 +187,10 @@ static void names_of_stops_are_whole(void **state)
     expect_stop(0, "one frame 123456789", 123456789, 123456789, 0, 0);
     expect_stop(1, "one frame 123456789.2", 123456789.25, 123456789.25, 0, 0);
     expect_stop(2, "one frame 123456789.5", 123456789.5, 123456789.5, 0, 0);
+    /* With nine digits 123456789.5 and 123456790.5 are both rounded to the even number. */
+    take(ONE, "kind: stops, frames_per_s: 1, first_frame: 123456789.5, last_frame: 123456790.5, frame_step: 1");
+    expect_stop(0, "one frame 123456789.5", 123456789.5, 123456789.5, 0, 0);
+    expect_stop(1, "one frame 123456790.5", 123456790.5, 123456790.5, 0, 0);
 }
 
 /* Along a trajectory the frame is the file's, or counted where the configuration counts in frames. */

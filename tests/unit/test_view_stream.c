@@ -126,6 +126,25 @@ static void each_point_has_its_columns(void **state)
     viewed_free(&shown);
 }
 
+/* Frame 5 was lost. It may have been points, and the telemetry with the final counts did not come, either. */
+static void a_gap_before_the_end_leaves_counts_unknown(void **state)
+{
+    (void)state;
+    uint8_t out[256];
+    const struct native_event start = {.code = NATIVE_EV_SCAN_START, .a = 1},
+                              end = {.code = NATIVE_EV_SCAN_END, .a = 1, .b = 6};
+    begin_geo(NATIVE_CRS_UTM, 32632, 3);
+    rig_put(out, native_encode_event(out, sizeof out, &start, 0, 0));
+    write_two_lines();
+    const size_t len = native_encode_event(out, sizeof out, &end, 0, 0);
+    native_finish_frame(out, 6);
+    rig_put(out, len);
+    loads();
+    assert_int_equal(shown.complete, 0);
+    assert_non_null(strstr(rig_notes, ": not complete: 0 pulses lost by the head, at least 0 did not arrive"));
+    viewed_free(&shown);
+}
+
 /* The rig's head has a heading of 90 degrees. */
 static void stations_have_their_places(void **state)
 {
@@ -320,6 +339,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(each_point_has_its_columns),
+        cmocka_unit_test(a_gap_before_the_end_leaves_counts_unknown),
         cmocka_unit_test(stations_have_their_places),
         cmocka_unit_test(a_grid_is_a_mesh),
         cmocka_unit_test(without_a_grid_the_reason_is_there),

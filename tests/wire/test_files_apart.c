@@ -122,6 +122,8 @@ static const struct {
     {"record --repair @k.ptx.part --stats=@o", "k.ptx.grid", "o", "--stats", "--repair"},
     {"record --repair @k.las --stats=@o", "k.wdp.part", "o", "--stats", "--repair"},
     {"record --repair @k.las.part --stats=@o", "k.wdp.part", "o", "--stats", "--repair"},
+    {"record --repair @k.las --stats=@o", "k.wdp", "o", "--stats", "--repair"},
+    {"record --repair @k.las.part --stats=@o", "k.wdp", "o", "--stats", "--repair"},
     {"record @c.yaml --set=scene.meshes[0].file=@o-1.obj --output=@o.obj --split", "room.obj", "o-1.obj", "--output",
      "scene.meshes[0].file"},
     {"record @c.yaml --set=platform.kind=trajectory --set=platform.file=@o-11.poses.csv --output=@o.poses.csv --each",
@@ -156,6 +158,8 @@ static const struct {
     {"record udp:127.0.0.1:0 --raw --output=@o.pcapng --stats=@o.pcapng.part", "--output", "--stats"},
     {"record --repair @o.ply --stats=@o.ply", "--repair", "--stats"}, /* of o.ply.part */
     {"record --repair @o.ply.part --stats=@o.ply", "--repair", "--stats"},
+    {"record --repair @o.las --stats=@o.wdp", "--repair", "--stats"}, /* of o.wdp.part */
+    {"record --repair @o.las.part --stats=@o.wdp", "--repair", "--stats"},
     {"run @scan.shs --stats=@o --truth=@./o", "--truth", "--stats"},
     {"run @scan.shs --config=@f.yaml --stats=@o", "links[0].path", "--stats"},
 };
@@ -180,6 +184,7 @@ static void begin(struct wire *wire)
     wire_write_text(wire, "k.ptx.part", "of a killed recorder");
     wire_write_text(wire, "k.ptx.grid", "of a killed recorder");
     wire_write_text(wire, "k.wdp.part", "of a killed recorder");
+    wire_write_text(wire, "k.wdp", "of a killed recorder");
     wire_write_text(wire, "journal", "a journal");
     wire_write_text(wire, "path.csv", "a path");
     wire_write_text(wire, "list.txt", "0 0\n90 0\n");

@@ -178,8 +178,9 @@ static int check_commands(const struct record_line *r)
                          : is_file && r->job.recording.duration_s > 0.0 ? "--duration"
                                                                         : NULL;
     if (option == NULL || (!is_file && !r->job.recording.listen)) return APP_OK;
-    return app_usage(&app_record, "%s: %s; allowed with a CONFIG, and with a head on a wire without --listen", option,
-                     is_file ? "a recorded stream has the scans that it has" : "--listen sends no command");
+    return app_usage(&app_record, "%s: %s; allowed with a CONFIG, and with a head on a wire%s", option,
+                     is_file ? "a recorded stream has the scans that it has" : "--listen sends no command",
+                     strcmp(option, "--duration") == 0 ? "" : " without --listen");
 }
 
 static int check_colours(const struct record_line *r)

@@ -34,6 +34,7 @@ struct recording {
     int stopping;                       /* the scan at hand is to end */
     int scan_started;                   /* SCAN_START or points were seen since SCAN:STAR */
     int scan_over, cut_short, broken;
+    int is_done;           /* the scan is over, and only its final counts are waited for: not for a head that is gone */
     double scan_s, into_s; /* how long the scan lasts, 0: not known; the time since its start */
     uint32_t station;      /* at hand */
 };
@@ -227,7 +228,7 @@ static int step(struct recording *r, int timeout_ms, struct sh_err *err)
     const int reported = recording_report(r, err);
     if (reported != SH_OK) return reported;
     if (rc == SCANHEAD_ETIMEOUT) return 0;
-    if (is_gone(r, rc)) return replug(r, rc, err);
+    if (is_gone(r, rc) && !r->is_done) return replug(r, rc, err);
     if (rc != SCANHEAD_OK) return sh_fail(err, rc, "%s", scanhead_error(r->sh));
     look_at(r, &frame);
     if (frame.type == SCANHEAD_POINTS) {
@@ -300,12 +301,12 @@ static int has_waited(const struct recording *r, int64_t asked_ns)
 static int await_counts(struct recording *r, struct sh_err *err)
 {
     const int64_t end_ns = clock_now_ns() + (int64_t)COUNTS_MS * 1000000;
-    while (r->result->counts.due.scan != 0 && clock_now_ns() < end_ns && !is_interrupted(r)) {
-        const int rc = step(r, NEXT_MS, err);
-        if (rc == SH_ECLOSED || rc == SH_ELOST || rc == SH_ERESET) return SH_OK;
-        if (rc < 0) return rc;
-    }
-    return SH_OK;
+    int rc = SH_OK;
+    r->is_done = 1;
+    while (rc >= 0 && r->result->counts.due.scan != 0 && clock_now_ns() < end_ns && !is_interrupted(r))
+        rc = step(r, NEXT_MS, err);
+    r->is_done = 0;
+    return rc >= 0 || rc == SH_ECLOSED || rc == SH_ELOST || rc == SH_ERESET ? SH_OK : rc;
 }
 
 static int recording_follow(struct recording *r, struct sh_err *err)

@@ -157,8 +157,8 @@ static int read_frames(struct viewed_stream *s, struct scanhead *sh, struct sh_e
     struct scanhead_frame frame;
     struct scanhead_stats stats;
     int rc = SH_OK;
+    scanhead_get_stats(sh, &stats);
     for (uint64_t k = 0; rc == SH_OK; k++) {
-        scanhead_get_stats(sh, &stats);
         if (k % FRAMES_BETWEEN_LOOKS == 0) {
             sh_progress(s->report, "reading the recording", (double)stats.bytes / s->file_bytes);
             if ((rc = sh_check_stop(s->report, err)) != SH_OK) return rc;
@@ -166,6 +166,7 @@ static int read_frames(struct viewed_stream *s, struct scanhead *sh, struct sh_e
         rc = scanhead_next(sh, &frame, -1);
         if (rc == SCANHEAD_ECLOSED) return SH_OK;
         if (rc != SCANHEAD_OK) return sh_fail(err, rc == SCANHEAD_EFORMAT ? SH_EINPUT : rc, "%s", scanhead_error(sh));
+        scanhead_get_stats(sh, &stats); /* a gap right before the frame counts, too */
         recording_count(&s->counts, &frame, frames_lost(&stats));
         rc = track_frame(&s->track, sh, &frame, err);
     }
