@@ -63,8 +63,6 @@ static int open_replay(struct device *device, struct sh_err *err)
 {
     struct device_journal *journal = &device->journal;
     int rc = journal_read(device->options.replay, &journal->replay, &journal->n_replay, err);
-    if (rc == SH_OK)
-        rc = journal_check_times(device->options.replay, journal->replay, journal->n_replay, device->tick_ns, err);
     if (rc != SH_OK) return rc;
     for (size_t i = 0; i < journal->n_replay && !journal->ends; i++) {
         if (!journal_is_end(&journal->replay[i])) continue;

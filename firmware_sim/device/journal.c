@@ -267,18 +267,3 @@ int journal_read(const char *path, struct journal_entry **entries, size_t *n, st
     *n = reader.n;
     return SH_OK;
 }
-
-int journal_check_times(const char *path, const struct journal_entry *entries, size_t n, int64_t tick_ns,
-                        struct sh_err *err)
-{
-    for (size_t i = 0; i < n; i++) {
-        const struct journal_entry *e = &entries[i];
-        /* The product tick * tick_ns may overflow where the comparison says that all is well. */
-        if (((uint64_t)e->t_ns + (uint64_t)tick_ns - 1) / (uint64_t)tick_ns <= e->tick) continue;
-        return sh_fail(err, SH_EINPUT,
-                       "journal: %s:%" PRIu32 ": the device time %" PRId64 " ns is after the tick %" PRIu64
-                       "; allowed is 0 to %" PRIu64 " ns with this loop.tick_hz",
-                       path, e->line_no, e->t_ns, e->tick, e->tick * (uint64_t)tick_ns);
-    }
-    return SH_OK;
-}

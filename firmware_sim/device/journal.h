@@ -5,8 +5,8 @@
  * `# scanhead journal 1`. Then there is one line per command
  *   <device tick> <device time, ns> <session> <command line>
  * with decimal numbers and one blank between them. The command takes effect with that tick. The device time is that of
- * the last released tick, which the client has seen; it is at most the tick's own time. The last line has the session 0
- * and END in place of a command: the run ended at that tick. This last line is missing where the head was killed. Other
+ * the last released tick, which the client has seen. It is after the tick's own time where the head gave up ticks that
+ * were not claimed yet. The last line has the session 0 and END in place of a command: the run ended at that tick. This last line is missing where the head was killed. Other
  * lines that begin with '#' and empty lines are notes.
  *
  * A thread writes the lines at once (line_writer.h), so the caller never waits for the file. Where the file is too
@@ -64,10 +64,5 @@ int journal_check_paths(const char *path, const char *replay, struct sh_err *err
  * after END is an error. So is a last line without a newline, since its command may be cut. Lines have up to 1,023
  * bytes, a journal up to 10,000,000 commands. On failure *entries is NULL. The caller frees it. */
 int journal_read(const char *path, struct journal_entry **entries, size_t *n, struct sh_err *err);
-
-/* Fails with SH_EINPUT, and names file:line, where an entry's device time is after its tick. tick_ns > 0: a tick's
- * length. A journal of a head with another loop.tick_hz fails so, or acts at other times. */
-int journal_check_times(const char *path, const struct journal_entry *entries, size_t n, int64_t tick_ns,
-                        struct sh_err *err);
 
 #endif

@@ -41,7 +41,8 @@ static struct wishes take_wishes(struct replay *r, uint64_t tick, int is_late)
     r->speed_changed = 0;
     const int waits = !r->ends_then || r->wants_start, plays = r->playing;
     wishes.over = !is_late && (r->ending || tick >= r->end_tick || (!waits && !plays));
-    wishes.idle = !is_late && !wishes.starts && (wishes.paused || (waits && !plays)) && r->end_tick == UINT64_MAX;
+    wishes.idle =
+        !is_late && !stops && !wishes.starts && (wishes.paused || (waits && !plays)) && r->end_tick == UINT64_MAX;
     pthread_mutex_unlock(&r->lock);
     if (stops) replay_stop(r, tick, 0);
     return wishes;

@@ -120,34 +120,6 @@ static void nothing_stands_after_the_end(void **ctx)
     }
 }
 
-/* Ticks of 1 ms: a client had seen at most the time at which its command's tick begins. */
-static void no_time_is_after_its_tick(void **ctx)
-{
-    (void)ctx;
-    static const struct {
-        uint64_t tick;
-        int64_t t_ns;
-        int rc;
-    } rows[] = {{0, 0, SH_OK},
-                {0, 1, SH_EINPUT},
-                {400, 400000000, SH_OK},
-                {400, 400000001, SH_EINPUT},
-                {400, 0, SH_OK}, /* the client was slow */
-                {UINT64_MAX, INT64_MAX, SH_OK},
-                {9223372036854, INT64_MAX, SH_EINPUT}, /* 2^63 ns are 9,223,372,036,854.8 ms */
-                {9223372036855, INT64_MAX, SH_OK}};
-    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
-        struct sh_err err = {0};
-        const struct journal_entry entries[] = {
-            {.tick = 1, .line_no = 2},
-            {.tick = rows[i].tick, .t_ns = rows[i].t_ns, .line_no = 7},
-        };
-        if (journal_check_times("j.txt", entries, 2, 1000000, &err) != rows[i].rc) fail_msg("row %zu", i);
-        assert_int_equal(strncmp(err.text, "journal: j.txt:7: ", 18) == 0, rows[i].rc != SH_OK);
-        if (i == 3) assert_non_null(strstr(err.text, "allowed is 0 to 400000000 ns"));
-    }
-}
-
 static void sorted_by_tick_and_else_as_in_the_file(void **ctx)
 {
     (void)ctx;
@@ -382,7 +354,6 @@ int main(void)
         cmocka_unit_test(what_is_written_is_read),
         cmocka_unit_test(the_format_is_as_documented),
         cmocka_unit_test(nothing_stands_after_the_end),
-        cmocka_unit_test(no_time_is_after_its_tick),
         cmocka_unit_test(sorted_by_tick_and_else_as_in_the_file),
         cmocka_unit_test(malformed_lines_are_named),
         cmocka_unit_test(what_is_no_journal_is_refused),

@@ -256,6 +256,29 @@ static void a_command_is_seen_at_once(void **state)
     free(cfg);
 }
 
+/* At the pace fast a paused recording makes no ticks. It makes the one that ends its scan. */
+static void a_paused_recording_can_be_stopped(void **state)
+{
+    (void)state;
+    struct config *cfg = config_new();
+    event_recording_write(file_path, 20);
+    const struct replay_options options = {.path = file_path, .speed = 1};
+    struct replay *r = open_replay(cfg, &options);
+    struct command_result result;
+    struct ring_tick tick;
+    assert_string_equal(said(r, "SCAN:REPL 0,1"), "OK");
+    assert_string_equal(tick_of_replay(r, 0), "0 ");
+    assert_string_equal(said(r, "SCAN:REPL ,0"), "OK");
+    assert_int_equal(replay_source.next(r, 1, 1, 0, &tick), LOOP_SOURCE_IDLE);
+    assert_string_equal(said(r, "SCAN:STOP"), "OK");
+    assert_int_equal(replay_source.next(r, 1, 1, 0, &tick), LOOP_SOURCE_TICK);
+    assert_int_equal(replay_source.next(r, 2, 1, 0, &tick), LOOP_SOURCE_IDLE);
+    replay_source.command(r, 1, "HEAD:STATE?", 2, &result);
+    assert_string_equal(result.reply, "idle");
+    replay_free(r);
+    free(cfg);
+}
+
 /* Two commands between two ticks do what they would do with a tick between them. */
 static void the_last_of_two_commands_decides(void **state)
 {
@@ -375,11 +398,17 @@ static void what_a_replay_refuses(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(frames_go_out_in_their_ticks),     cmocka_unit_test(each_time_has_its_numbers),
-        cmocka_unit_test(a_part_begins_with_the_head),      cmocka_unit_test(its_name_is_a_line),
-        cmocka_unit_test(a_command_seeks_paces_and_loops),  cmocka_unit_test(a_command_is_seen_at_once),
-        cmocka_unit_test(the_last_of_two_commands_decides), cmocka_unit_test(what_a_replay_refuses),
-        cmocka_unit_test(a_new_round_begins_with_the_head), cmocka_unit_test(a_seek_to_the_end_of_a_part_is_its_end),
+        cmocka_unit_test(frames_go_out_in_their_ticks),
+        cmocka_unit_test(each_time_has_its_numbers),
+        cmocka_unit_test(a_part_begins_with_the_head),
+        cmocka_unit_test(its_name_is_a_line),
+        cmocka_unit_test(a_command_seeks_paces_and_loops),
+        cmocka_unit_test(a_command_is_seen_at_once),
+        cmocka_unit_test(a_paused_recording_can_be_stopped),
+        cmocka_unit_test(the_last_of_two_commands_decides),
+        cmocka_unit_test(what_a_replay_refuses),
+        cmocka_unit_test(a_new_round_begins_with_the_head),
+        cmocka_unit_test(a_seek_to_the_end_of_a_part_is_its_end),
     };
     return cmocka_run_group_tests_name("replay state", tests, make_file, remove_file);
 }

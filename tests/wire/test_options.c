@@ -50,7 +50,6 @@ static const struct {
     {{"run", "DIR/fifo"}, {"fifo: cannot be opened: a FIFO, not a file"}},
     {{"run", "CONFIG", "--replay-journal", "DIR/fifo"}, {"fifo: a FIFO, not a file"}},
     {{"run", "CONFIG", "--replay-journal", "/dev/zero"}, {"/dev/zero: a device, not a file"}},
-    {{"run", "CONFIG", "--replay-journal", "DIR/late"}, {"late:2: the device time 3000000 ns is after the tick 2;"}},
     {{"run", "CONFIG", "--journal", "DIR/journal", "--replay-journal", "DIR/./journal"}, {"--journal ", "overwritten"}},
     {{"run", "CONFIG", "--journal", "DIR/link", "--replay-journal", "DIR/journal"}, {"--journal ", "overwritten"}},
     {{"check", "CONFIG", "--set", "platform.kind=trajectory", "--set", "platform.file=DIR/fifo"},
@@ -181,7 +180,6 @@ static void test_options(void **state)
     room_write(wire);
     wire_write_text(wire, "config.yaml", USAGE_GOOD);
     wire_write_text(wire, "journal", JOURNAL);
-    wire_write_text(wire, "late", "# scanhead journal 1\n2 3000000 1 *RST\n");
     assert_int_equal(symlink("journal", wire_path(wire, "link")), 0);
     assert_int_equal(mkfifo(wire_path(wire, "fifo"), 0600), 0);
     assert_int_equal(mkfifo(wire_path(wire, "fifo.shs"), 0600), 0);

@@ -10,7 +10,7 @@ import {BESIDE_POINTS, Decoder, isBefore, LOCAL, Parser, POINTS} from './native.
 const HEAD = 56, VERSION = 1;
 const REST_MS = 20; // it waits so long between two pieces, since a scanning head has other work
 // The head's observer reads the stream a little later than this page, or much later on a busy machine.
-const AGAIN_MS = 100, SELDOM_MS = 1000, PATIENCE_MS = 10000;
+const AGAIN_MS = 100, NEWS_MS = 300, SELDOM_MS = 1000, PATIENCE_MS = 10000;
 
 const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
 
@@ -39,6 +39,8 @@ export class Past {
   #first = null; // it is the number of the first live points frame that was taken
   #need = null; // it is the number of the newest frame that only /past brings
   #until_ms = 0; // after this time the page asks more seldom for frames that /past has not brought
+  #news_ms = 0; // it is the time of the last piece with frames
+  #wake = () => {}; // it ends the present rest between two pieces
   #takesLive = true;
   #takesPast = true;
 
@@ -106,6 +108,10 @@ export class Past {
   }
 
   #wants(seq) {
+    if (this.#need === null) {
+      this.#until_ms = performance.now() + PATIENCE_MS;
+      this.#wake();
+    }
     this.#need = seq;
     this.#read();
   }
@@ -166,12 +172,20 @@ export class Past {
       const isAtEnd = head.next === head.end, isQuiet = this.#need === null;
       if (!isAtEnd) this.#until_ms = performance.now() + PATIENCE_MS;
       else if (!isQuiet && isBefore(this.#need, head.next_seq)) return this.decoder.flush(true);
-      const isLate = performance.now() > this.#until_ms, hasNoNews = bytes.byteLength === HEAD;
-      if (isLate || (isQuiet && hasNoNews)) this.decoder.flush(true);
-      await sleep(!isAtEnd ? REST_MS : isLate ? SELDOM_MS : AGAIN_MS);
+      if (bytes.byteLength > HEAD) this.#news_ms = performance.now();
+      const isLate = performance.now() > this.#until_ms, hasNoNews = performance.now() > this.#news_ms + NEWS_MS;
+      if (isLate || (isQuiet && hasNoNews)) this.decoder.flush(true); // nothing follows the last frame, it seems
+      await this.#rest(!isAtEnd ? REST_MS : isLate ? SELDOM_MS : AGAIN_MS);
       while (goesOn() && !this.#hasRoom()) await sleep(REST_MS);
       if (!goesOn()) return;
     }
+  }
+
+  #rest(ms) {
+    return new Promise((done) => {
+      this.#wake = done;
+      setTimeout(done, ms);
+    });
   }
 
   #push(bytes, head) {
