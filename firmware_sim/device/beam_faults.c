@@ -111,7 +111,7 @@ static int64_t free_uhz(const struct device_beam *beam, int64_t lines_uhz)
 
 void device_fill_spec(struct device_beam *beam, const struct site *site, struct schedule_spec *spec)
 {
-    site_fill_spec(site, beam->settings, spec);
+    site_fill_spec(site, &beam->scan->settings, spec);
     beam->scan->prr_uhz = spec->prr_uhz;
     beam->scan->lines_uhz = spec->lines_uhz;
     spec->lines_uhz = beam->held_uhz != 0 ? beam->held_uhz : spec->lines_uhz + free_uhz(beam, spec->lines_uhz);

@@ -9,14 +9,12 @@
 #include "firmware_sim/device/scan_state.h"
 #include "firmware_sim/fault/board.h"
 
-struct head_settings;
 struct schedule_spec;
 struct site;
 
 struct device_beam {
-    struct device_scan *scan; /* these four are the device's */
+    struct device_scan *scan; /* these three are the device's */
     struct fault_board *board;
-    const struct head_settings *settings;
     int64_t tick_ns;
     int64_t held_uhz; /* the rotor's speed while its phase is held (phase_lock.c); 0: it runs free */
     double free_ppm;  /* the error of its speed while it runs free */
@@ -32,9 +30,9 @@ struct device_beam {
     struct device_disturbance now; /* the disturbance by all that strike together */
 };
 
-/* The schedule of a site's head with the present settings, slowed by faults of its mirror. Sets the scan's rates. */
+/* The schedule of a site's head with the settings of the scan, slowed by faults of its mirror. Sets the scan's rates. */
 void device_fill_spec(struct device_beam *beam, const struct site *site, struct schedule_spec *spec);
-/* Takes over the present rates from a pulse of the scan on. */
+/* Takes over the rates of the scan's settings and faults from a pulse of the scan on. */
 void device_set_rates(struct device_beam *beam, uint64_t pulse);
 /* Begins and ends the faults that do so at the scan's next pulse, if that fires before until_ns of the scan. The
  * segment has the new rates from there on; each change is noted on the board. Sets the next edge. */

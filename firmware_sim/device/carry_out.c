@@ -8,12 +8,26 @@
 
 _Static_assert((int)COMMAND_PEERS == (int)DEVICE_MAX_SESSIONS + 1, "each session has a place for its client's name");
 
-/* A stopped scan has its last pulses in the next tick. What can't change within a scan leaves that tick alone. */
+/* Gives a scan those of the present settings that may change within it. A step of the next scan stays away, and so do
+ * the rates that go with that step. */
+static void take_settings(struct head_settings *scan, const struct head_settings *present)
+{
+    const struct head_settings was = *scan;
+    *scan = *present;
+    if (present->step_udeg == was.step_udeg) return;
+    scan->step_udeg = was.step_udeg;
+    scan->prr_uhz = was.prr_uhz;
+    scan->lines_uhz = was.lines_uhz;
+}
+
+/* A scan may be on although clients see a state that allows settings of the next scan. A stopped scan has its last
+ * pulses in the next tick. A scan from power-up (--start) is claimed ahead of the boot's end. */
 static void change_settings(struct device *device, const struct command_result *command)
 {
-    if (!device->scan.on || (device->scan.stop_requested && command->for_next_scan)) return;
+    if (!device->scan.on || command->for_next_scan) return;
     struct schedule_spec spec;
-    if (device->cmd.settings.lines_uhz != device->scan.lines_uhz) device->beam.held_uhz = 0; /* until the next PPS */
+    take_settings(&device->scan.settings, &device->cmd.settings);
+    if (device->scan.settings.lines_uhz != device->scan.lines_uhz) device->beam.held_uhz = 0; /* until the next PPS */
     device_fill_spec(&device->beam, device->scan.site, &spec);
     schedule_change(&device->scan.segment, &device->scan.segment, &spec, device->scan.pulse_next);
     device->scan.describe = 1;

@@ -121,7 +121,6 @@ static int open_faults(struct device *device, struct sh_err *err)
     ptp_init(&device->ptp, &device->site->cfg->time.ptp, device->site->cfg->noise.seed);
     device->beam = (struct device_beam){.scan = &device->scan,
                                         .board = device->faults,
-                                        .settings = &device->cmd.settings,
                                         .tick_ns = device->tick_ns,
                                         .free_ppm = device->site->cfg->head.motor_ppm};
     device->desk = (struct fault_desk){.cfg = device->site->cfg, .board = device->faults};

@@ -32,7 +32,7 @@ static double turn_at(const struct schedule_segment *seg, uint64_t k, int64_t t_
 static int is_on(const struct device *device)
 {
     const struct device_scan *scan = &device->scan;
-    return device->cmd.settings.phase_lock != 0 && scan->on && scan->lines_uhz % HERTZ_UHZ == 0;
+    return device->scan.settings.phase_lock != 0 && scan->on && scan->lines_uhz % HERTZ_UHZ == 0;
 }
 
 static void set_speed(struct device *device, int64_t held_uhz)
@@ -45,7 +45,7 @@ static void set_speed(struct device *device, int64_t held_uhz)
 static void note_edge(struct device *device, double turn)
 {
     struct command_phase *phase = &device->cmd.phase;
-    const int64_t phase_udeg = device->cmd.settings.phase_udeg;
+    const int64_t phase_udeg = device->scan.settings.phase_udeg;
     phase->edge_udeg = llround((turn - floor(turn)) * TURN_UDEG) % (int64_t)TURN_UDEG;
     phase->is_known = 1;
     phase->is_held = device->beam.held_uhz != 0 &&
@@ -61,7 +61,7 @@ static void hold(struct device *device, int64_t edge_ns)
     const int64_t most_uhz = site_profile(device->site)->lines_max_uhz;
     const double left_s = 1.0 + (double)(edge_ns - schedule_time_ns(seg, scan->pulse_next)) / SECOND_NS;
     const double free_turn = schedule_sweep_turn(seg, scan->pulse_next) + 1e-6 * (double)scan->lines_uhz * left_s;
-    double missing = wrap((double)device->cmd.settings.phase_udeg / TURN_UDEG - free_turn);
+    double missing = wrap((double)device->scan.settings.phase_udeg / TURN_UDEG - free_turn);
     if (missing > 0.0 && scan->lines_uhz + llround(1e6 * missing / left_s) > most_uhz) missing -= 1.0;
     set_speed(device, scan->lines_uhz + llround(1e6 * missing / left_s));
 }

@@ -41,6 +41,7 @@ void device_begin_scan(struct device *device, uint64_t tick)
                                         .site = site,
                                         .variant = variant,
                                         .number = device->scan.number + 1,
+                                        .settings = device->cmd.settings,
                                         .tick0 = tick,
                                         .station = device->cmd.settings.station - 1,
                                         .station_scan = ++device->station_scans[device->cmd.settings.station - 1],
@@ -137,8 +138,8 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
     work->station = device->scan.station;
     work->station_scan = device->scan.station_scan;
     work->stretch = device->scan.stretch;
-    work->echoes = device->cmd.settings.echoes;
-    work->waves = device->cmd.settings.waves;
+    work->echoes = device->scan.settings.echoes;
+    work->waves = device->scan.settings.waves;
     work->pulse0 = device->scan.pulse_next;
     /* After a stop all pulses that fired before this tick go out. Otherwise the cut leaves an incomplete packet for the
      * next tick. */
@@ -189,6 +190,7 @@ void device_before_scans(struct device *device)
     struct schedule_spec spec;
     struct sh_err err;
     device_end_beam(&device->beam, 0);
+    scan->settings = *settings;
     scan->station = settings->station - 1;
     if (device_find_variant(&device->variants, settings, scan->station, &scan->variant, &err) != SH_OK)
         scan->variant = NULL;
@@ -200,10 +202,12 @@ void device_before_scans(struct device *device)
 
 void device_describe(struct device *device, struct device_work *work)
 {
+    /* At rest the descriptor has the echoes and the waveforms of the next scan. */
+    const struct head_settings *settings = device->scan.on ? &device->scan.settings : &device->cmd.settings;
     work->describe = 1;
     work->describe_flags = device->scan.describe ? 0 : NATIVE_REPEAT;
-    device_fill_descriptor(&device->scan, device->idn, device->cmd.settings.waves, &work->descriptor);
-    device_fill_emitter(&device->scan, device->cmd.settings.echoes, &work->emitter, work->beam);
+    device_fill_descriptor(&device->scan, device->idn, settings->waves, &work->descriptor);
+    device_fill_emitter(&device->scan, settings->echoes, &work->emitter, work->beam);
     device_fill_anchor(device->scan.site, device->scan.station, device->scan.stretch, &work->anchor);
     device->scan.describe = device->scan.anchor_lost = 0;
 }

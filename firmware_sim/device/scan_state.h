@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 #include "core/schedule.h"
+#include "firmware_sim/command/head.h"
 
 struct device_variant;
 struct site;
@@ -21,6 +22,9 @@ struct device_scan {
     uint64_t pulse_next;            /* next pulse to be claimed */
     uint64_t cast;                  /* how many of the pulses before are cast */
     struct schedule_segment segment;
+    /* The settings that its pulses fire with. Commands change them only in what may change within a scan. Ranges, noise
+     * and station are those of `site` and `station` instead. */
+    struct head_settings settings;
     int64_t prr_uhz, lines_uhz; /* as set; with a slow mirror the segment has other rates */
     uint32_t station;           /* from 0 */
     uint32_t station_scan;      /* which of its scans */

@@ -86,6 +86,11 @@ void need(int rc, const struct sh_err *err)
 
 struct rig *rig_open(const struct device_options *options, const char *const *sets, int n_sets)
 {
+    return rig_open_file("run.yaml", options, sets, n_sets);
+}
+
+struct rig *rig_open_file(const char *name, const struct device_options *options, const char *const *sets, int n_sets)
+{
     static const struct device_options none = {0};
     struct sh_err err;
     char path[96];
@@ -93,7 +98,7 @@ struct rig *rig_open(const struct device_options *options, const char *const *se
     assert_non_null(rig);
     rig->cfg = calloc(1, sizeof *rig->cfg);
     assert_non_null(rig->cfg);
-    snprintf(path, sizeof path, "%s/run.yaml", folder);
+    snprintf(path, sizeof path, "%s/%s", folder, name);
     need(config_load(path, sets, n_sets, rig->cfg, &err), &err);
     need(site_load(rig->cfg, NULL, &rig->site, &err), &err);
     need(device_create(rig->site, options != NULL ? options : &none, &rig->device, &err), &err);

@@ -46,6 +46,9 @@ void need(int rc, const struct sh_err *err);
 
 struct rig *rig_open(const struct device_options *options, const char *const *sets, int n_sets);
 
+/* The configuration is another file in the folder. */
+struct rig *rig_open_file(const char *name, const struct device_options *options, const char *const *sets, int n_sets);
+
 void rig_close(struct rig *rig);
 
 /* Claims the next tick. Returns 0 where there is none. */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Commands change what a scan is planned by. The scan has the same bytes as if the configuration had these values. The
- * ranges of the scans before and after it stay as they were. */
+ * ranges of the scans before and after it stay as they were. A setting of the next scan leaves the scan alone that is
+ * still on. */
 #include "tests/unit/device_rig.h"
 
 #include "drivers/protocol/crc32c.h"
@@ -199,6 +200,126 @@ static void a_head_settles_after_a_command(void **state)
     rig_close(rig);
 }
 
+/* ---- settings of the next scan that come while a scan is on */
+
+/* 25 lines per second at 0.25 or 0.5 degrees, and 50 at 0.5. */
+static struct rig *open_planar(const struct device_options *options)
+{
+    char path[96];
+    snprintf(path, sizeof path, "%s/planar.yaml", folder);
+    FILE *f = fopen(path, "w");
+    assert_non_null(f);
+    fprintf(f, "head: {profile: sick-lms111, lines_hz: 25, step_deg: 0.5, frames: 0}\n"
+               "scene:\n  meshes: [{file: room.obj, up: z, scale: 1}]\nstations: [{position_m: [0, 0, 0]}]\n");
+    assert_int_equal(fclose(f), 0);
+    struct rig *rig = rig_open_file("planar.yaml", options, NULL, 0);
+    unlink(path);
+    return rig;
+}
+
+/* The head fires once a step. So the pulse rate is the line rate times the steps of a turn, in the descriptor and in
+ * the schedule of the pulses. */
+static void expect_descriptor(const struct device_work *work, uint32_t steps)
+{
+    assert_true(work->describe);
+    assert_int_equal(work->emitter.steps, steps);
+    assert_int_equal(work->descriptor.lines_uhz, 25000000);
+    assert_int_equal(work->descriptor.prr_uhz, 25000000 * (int64_t)steps);
+}
+
+static void expect_pulses(const struct device_work *work, uint32_t steps)
+{
+    const struct schedule_spec *spec = &work->segment.spec;
+    assert_true(work->scanning && work->pulse_end > work->pulse0);
+    assert_int_equal(spec->emitter->steps, steps);
+    assert_int_equal(spec->lines_uhz, 25000000);
+    assert_int_equal(spec->prr_uhz, 25000000 * (int64_t)steps);
+}
+
+struct stopped {
+    const char *step, *line[3];
+    int changes; /* the last line changes the stopped scan */
+    uint32_t steps, then_steps;
+};
+
+/* Scans with a step, and gives the three lines before the last tick. At 18 or 36 pulses per tick, an incomplete packet
+ * of 16 is left for that tick 1003 ticks after the scan's start. */
+static void stop_a_scan(const struct stopped *row)
+{
+    char step[32];
+    snprintf(step, sizeof step, "SCAN:STEP %s", row->step);
+    struct rig *rig = open_planar(NULL);
+    rig_go_to(rig, BOOTED);
+    rig_tell(rig, step, BOOTED);
+    rig_tell(rig, "SCAN:START", BOOTED);
+    rig_go_to(rig, BOOTED + 30 + 1003);
+    for (int k = 0; k < 3; k++)
+        rig_tell(rig, row->line[k], rig->next - 1);
+    assert_true(rig_claim(rig));
+    assert_non_null(rig_event(rig, NATIVE_EV_SCAN_END));
+    assert_int_equal(rig_event(rig, NATIVE_EV_SETTINGS) != NULL, row->changes);
+    expect_pulses(&rig->work, row->steps);
+    if (row->changes) expect_descriptor(&rig->work, row->steps);
+    rig_go_to(rig, 2001); /* at rest the last scan is described again, each full second */
+    expect_descriptor(&rig->work, row->steps);
+    rig_tell(rig, "SCAN:START", rig->next - 1);
+    rig_wait(rig, NATIVE_EV_SCAN_START, 300);
+    assert_int_equal(rig->work.emitter.steps, row->then_steps);
+    rig_close(rig);
+}
+
+/* A new list of faults sets the rates again, also before its fault begins. */
+static void a_step_of_the_next_scan_leaves_the_last_pulses_alone(void **state)
+{
+    (void)state;
+    static const struct stopped rows[] = {
+        {"0.5", {"SCAN:STOP", "SCAN:STEP 0.25", "*OPC?"}, 0, 720, 1440},
+        {"0.5", {"SCAN:STOP", "SCAN:STEP 0.25", "SCAN:FRAMES 1000"}, 1, 720, 1440},
+        {"0.5", {"SCAN:STOP", "SCAN:STEP 0.25", "SCAN:ECHOES LAST"}, 1, 720, 1440},
+        {"0.5", {"SCAN:STOP", "SCAN:STEP 0.25", "FAUL:ADD {kind: mirror_slow, factor: 0.5}"}, 0, 720, 1440},
+        {"0.25", {"SCAN:STOP", "SCAN:STEP 0.5", "HEAD:LINES 50"}, 1, 1440, 720},
+        {"0.25", {"*RST", "*OPC?", "SCAN:FRAMES 1000"}, 1, 1440, 720},
+        {"0.25", {"*RST", "*OPC?", "FAUL:ADD {kind: mirror_slow, factor: 0.5}"}, 0, 1440, 720},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
+        stop_a_scan(&rows[i]);
+}
+
+/* A scan from power-up begins at tick 230, in ticks that are claimed ahead. The client still sees the boot, which
+ * allows a step of the next scan. */
+static void a_step_in_the_boot_leaves_the_claimed_scan_alone(void **state)
+{
+    (void)state;
+    struct rig *rig = open_planar(&(struct device_options){.start = 1});
+    rig_go_to(rig, 240);
+    assert_true(rig->work.scanning);
+    assert_string_equal(rig_state(rig, 190), "boot");
+    rig_tell(rig, "SCAN:STEP 0.25", 190);
+    assert_true(rig_claim(rig) && !rig->work.describe);
+    assert_null(rig_event(rig, NATIVE_EV_SETTINGS));
+    rig_tell(rig, "SCAN:ECHOES LAST", 240); /* this one may change within a scan */
+    assert_true(rig_claim(rig) && rig->work.echoes == BEAM_LAST);
+    assert_non_null(rig_event(rig, NATIVE_EV_SETTINGS));
+    expect_descriptor(&rig->work, 720);
+    expect_pulses(&rig->work, 720);
+    rig_close(rig);
+}
+
+/* The descriptor says which echoes are sent. A reset, which has no descriptor, leaves the echoes of the last pulses. */
+static void a_reset_leaves_the_last_pulses_their_echoes(void **state)
+{
+    (void)state;
+    struct rig *rig = rig_open(NULL, NULL, 0);
+    rig_go_to(rig, BOOTED);
+    rig_tell(rig, "SCAN:ECHOES LAST", BOOTED);
+    rig_tell(rig, "SCAN:START", BOOTED);
+    rig_go_to(rig, BOOTED + 100);
+    rig_tell(rig, "*RST", rig->next - 1);
+    assert_true(rig_claim(rig) && rig->work.scanning && !rig->work.describe);
+    assert_int_equal(rig->work.echoes, BEAM_LAST);
+    rig_close(rig);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -210,6 +331,9 @@ int main(void)
         cmocka_unit_test(the_last_scan_is_described_as_it_was),
         cmocka_unit_test(what_can_not_be_is_refused),
         cmocka_unit_test(a_head_settles_after_a_command),
+        cmocka_unit_test(a_step_of_the_next_scan_leaves_the_last_pulses_alone),
+        cmocka_unit_test(a_step_in_the_boot_leaves_the_claimed_scan_alone),
+        cmocka_unit_test(a_reset_leaves_the_last_pulses_their_echoes),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
