@@ -75,7 +75,7 @@ static void identify(struct links *links, const struct config *cfg)
         id->geometry[i] = (struct protocol_geometry){cfg->profile.arrangement.geometry[i].lines_uhz,
                                                      cfg->profile.arrangement.geometry[i].steps_per_turn};
     config_fill_fields(cfg, &links->fields);
-    id->fields = &links->fields;
+    id->fields = cfg->n_fields + cfg->n_inputs != 0 ? &links->fields : NULL; /* pump_protocol.c: look_back */
     for (uint32_t i = cfg->n_links; i-- > 0;) {
         if (cfg->link[i].protocol != PROTOCOL_VELODYNE || cfg->link[i].type != LINK_UDP) continue;
         snprintf(links->data_address, sizeof links->data_address, "%s", cfg->link[i].address);

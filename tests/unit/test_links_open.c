@@ -103,8 +103,13 @@ static void protocols_know_the_head_and_its_data_link(void **state)
     assert_int_equal(id->n_geometries, 2);
     assert_true(id->geometry[0].lines_uhz == 15000000 && id->geometry[0].steps == 1080);
     assert_true(id->geometry[1].lines_uhz == 25000000 && id->geometry[1].steps == 720);
-    static const struct cola_fields none;
-    assert_memory_equal(id->fields, &none, sizeof none);
+    assert_null(id->fields);
+    loop_free(loop);
+    cfg->n_fields = cfg->n_inputs = 1;
+    cfg->field[0].number = 1;
+    loop = open_links(cfg, &err);
+    if (loop == NULL) fail_msg("%s", err.text);
+    assert_ptr_equal(loop->links.identity.fields, &loop->links.fields);
     loop_free(loop);
     rig_close(rig);
 }
