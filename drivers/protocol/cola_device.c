@@ -161,10 +161,12 @@ enum cola_error cola_log_out(struct cola *self, struct cola_args *args, struct c
 int cola_start_scan(struct cola *self)
 {
     const enum protocol_head_state head = protocol_ask_state(&self->spec.host);
-    int refused = head == PROTOCOL_HEAD_FAULT || head == PROTOCOL_HEAD_UNKNOWN;
-    if (head == PROTOCOL_HEAD_IDLE) refused = self->spec.host.command(self->spec.host.ctx, "SCAN:START", NULL, 0) != 0;
     /* While the wish lasts, a head that is idle is started again, since somebody may have stopped it. */
-    if (!refused && (!self->wish.lasts || head == PROTOCOL_HEAD_IDLE)) scan_wish_make(&self->wish, &self->scan);
+    const int starts = head == PROTOCOL_HEAD_IDLE && !scan_wish_is_starting(&self->wish, &self->scan, self->now_ns);
+    int refused = head == PROTOCOL_HEAD_FAULT || head == PROTOCOL_HEAD_UNKNOWN;
+    if (starts) refused = self->spec.host.command(self->spec.host.ctx, "SCAN:START", NULL, 0) != 0;
+    if (!refused && !self->wish.lasts) scan_wish_make(&self->wish, self->now_ns);
+    if (!refused && starts) scan_wish_start(&self->wish, self->now_ns);
     if (!refused) return 0;
     self->wish.lasts = 0;
     for (uint32_t i = 0; i < self->n_waiting; i++)

@@ -61,7 +61,6 @@ static void take_descriptor(struct planar_scan *s, const struct native_descripto
     if ((flags & NATIVE_LOCAL) != 0 && !repeated) s->fresh = s->done = 1;
     s->scan = d->scan;
     s->pan_counts = d->pan_counts_per_turn;
-    h->frames = d->frames;
     h->lines_uhz = d->lines_uhz;
     h->prr_uhz = d->prr_uhz;
     h->range_min_m = d->range_min_m;
@@ -99,10 +98,10 @@ static uint32_t planar_scan_place_of(const struct planar_scan *s, uint32_t pan)
 
 /* ---- turns */
 
-/* Begins the turn that a frame belongs to, unless it is the one at hand. from_start: the frame has the first pulse of
+/* Begins the turn that a frame of time t_ns belongs to, unless it is the one at hand. from_start: the frame has the first pulse of
  * its turn. */
-static void turn_to(struct planar_scan *s, int64_t scan_t0_ns, uint32_t line, int64_t line_t0_ns, int from_start,
-                    struct planar_news *news)
+static void turn_to(struct planar_scan *s, int64_t t_ns, int64_t scan_t0_ns, uint32_t line, int64_t line_t0_ns,
+                    int from_start, struct planar_news *news)
 {
     const int same_scan = s->seen && scan_t0_ns == s->scan_t0_ns;
     if (same_scan && line == s->line && !s->fresh) return;
@@ -116,8 +115,11 @@ static void turn_to(struct planar_scan *s, int64_t scan_t0_ns, uint32_t line, in
     s->done = s->fresh && !from_start;
     s->fresh = 0;
     s->seen = news->begun = 1;
+    if (!same_scan) s->scan_came_ns = t_ns;
     s->scan_t0_ns = scan_t0_ns;
     s->line = line;
+    s->now->scan_t0_ns = scan_t0_ns;
+    s->now->scan_came_ns = s->scan_came_ns;
     s->now->t0_ns = s->t0_ns = native_after_ns(scan_t0_ns, line_t0_ns);
     s->now->number = s->number0 + line;
     s->n_seen = s->n_waiting = 0;
@@ -177,7 +179,7 @@ static void add_points(struct planar_scan *s, const uint8_t *payload, uint32_t n
 static void planar_scan_take_points(struct planar_scan *s, const struct native_header *header, const uint8_t *payload,
                                     const struct native_points *points, struct planar_news *news)
 {
-    turn_to(s, native_since_ns(header->t_ns, points->t0_ns), points->line, points->line_t0_ns,
+    turn_to(s, header->t_ns, native_since_ns(header->t_ns, points->t0_ns), points->line, points->line_t0_ns,
             from_start(s, payload, points), news);
     if (s->n_waiting != 0) break_turn(s, news); /* the attributes of the points before are missing */
     if (s->done) return;
@@ -207,7 +209,7 @@ static void take_attributes(struct planar_scan *s, const uint8_t *payload, const
 static void take_line_end(struct planar_scan *s, const struct native_header *header, const struct line_end *end,
                           struct planar_news *news)
 {
-    turn_to(s, native_since_ns(header->t_ns, end->t1_ns), end->line, end->t0_ns, 0, news);
+    turn_to(s, header->t_ns, native_since_ns(header->t_ns, end->t1_ns), end->line, end->t0_ns, 0, news);
     if (!s->done && (end->status & LINE_PARTIAL) == 0) break_turn(s, news);
     s->done = 1;
 }

@@ -27,7 +27,6 @@ struct planar_head {
     int known;         /* 0: none came, or it is not planar, or has more steps than fit. The rest is then void */
     uint32_t steps, n; /* steps of a turn; those that are cast */
     int32_t first, last, front; /* steps; front looks along y and may lie outside of first..last */
-    uint32_t frames;            /* of a scan, which then ends by itself; 0: it goes on until it is stopped */
     uint64_t lines_uhz, prr_uhz;
     double range_min_m, range_max_m, m_per_count;
     int attributes; /* points have amplitudes, unless these are not modelled */
@@ -40,6 +39,8 @@ struct planar_echo {
 
 struct planar_turn {
     int64_t t0_ns;               /* device time of step 0 */
+    int64_t scan_t0_ns;          /* of its scan's start; a recording may begin later */
+    int64_t scan_came_ns;        /* of its scan's first frame that came; each round of a recording is a scan */
     uint32_t number;             /* turns before it, in its scan and in earlier ones, lost turns included */
     uint8_t n[PLANAR_MAX_STEPS]; /* echoes of each place, PLANAR_ECHOES at most; PLANAR_UNSEEN: no pulse came */
     struct planar_echo echo[PLANAR_MAX_STEPS][PLANAR_ECHOES]; /* in order of range */
@@ -53,8 +54,8 @@ struct planar_scan {
     /* the members below are for planar_scan.c alone */
     struct planar_turn *now; /* being filled: the one that is not `whole` */
     struct native_emitter emitter;
-    uint32_t line, number0; /* number0: turns of the scans before */
-    int64_t scan_t0_ns;
+    uint32_t line, number0;           /* number0: turns of the scans before */
+    int64_t scan_t0_ns, scan_came_ns; /* see planar_turn */
     int seen, fresh, done; /* a turn was seen; pulses missed so far are no loss; the present turn needs no more */
     uint32_t n_seen;       /* places that have their pulse */
     double pan_counts, steps_per_count;

@@ -21,7 +21,10 @@ const char *scip_laser_on(struct scip *s)
     const enum protocol_head_state head = scans ? PROTOCOL_HEAD_SCANNING : protocol_ask_state(&s->host);
     if (head == PROTOCOL_HEAD_FAULT) return "50";
     if (scip_boots(head)) return "10";
-    if (head == PROTOCOL_HEAD_IDLE && s->host.command(s->host.ctx, "SCAN:START", NULL, 0) != 0) return "10";
+    if (head == PROTOCOL_HEAD_IDLE && !scan_wish_is_starting(&s->wish, &s->scan, s->now_ns)) {
+        if (s->host.command(s->host.ctx, "SCAN:START", NULL, 0) != 0) return "10";
+        scan_wish_start(&s->wish, s->now_ns);
+    }
     if (!s->laser) s->laser_ns = s->now_ns;
     s->laser = 1;
     s->asleep = 0;
@@ -93,7 +96,7 @@ const char *scip_measure(struct scip *s)
         return NULL;
     }
     s->stream = request;
-    scan_wish_make(&s->wish, &s->scan);
+    scan_wish_make(&s->wish, s->now_ns);
     s->simulation.n_waiting = 0; /* a new stream has all phases of DB, from the first on */
     return "00";
 }

@@ -175,95 +175,6 @@ static void states_follow_the_head(void **state)
     assert_int_equal(cola_ask("sRN STlms")[10], '6');
 }
 
-static void a_resting_head_is_started(void **state)
-{
-    (void)state;
-    cola_open_lms();
-    cola_authorise();
-    cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 0");
-    assert_int_equal(cola.n_lines, 1); /* it scans already */
-    cola_head_state("idle");
-    cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 0");
-    assert_int_equal(cola.n_lines, 2);
-    assert_string_equal(cola.line[1], "SCAN:START");
-    cola_expect("sEN LMDscandata 1", "sEA LMDscandata 1");
-    assert_string_equal(cola.line[1], "SCAN:START");
-    cola_expect("sEN LMDscandata 0", "sEA LMDscandata 0"); /* a client that wants no scans starts none */
-    assert_int_equal(cola.n_lines, 0);
-    cola_expect("sMN LMCstopmeas", "sAN LMCstopmeas 0"); /* of this session alone */
-    assert_int_equal(cola.n_lines, 0);
-    cola_expect("sEN LMDscandata 1", "sEA LMDscandata 1");
-    assert_int_equal(cola.n_lines, 0); /* the session measures nothing */
-    cola_head_state("fault");
-    cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 1");
-    cola_head_state("scanning");
-    assert_int_equal(cola_ask("sRN STlms")[10], '6'); /* the session is stopped, as before */
-    cola_head_state("spin-down");                     /* the scan starts as soon as it can */
-    cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 0");
-    cola_head_state("idle");
-    cola.ops->time(cola.protocol, 200000000);
-    assert_string_equal(cola.line[cola.n_lines - 1], "SCAN:START");
-    cola_head_state("scanning"); /* but somebody has stopped it: no scan comes */
-    cola_expect("sEN LMDscandata 1", "sEA LMDscandata 1");
-    cola_head_state("idle");
-    cola.ops->time(cola.protocol, 400000000);
-    assert_string_equal(cola.line[cola.n_lines - 1], "SCAN:START");
-    cola_head_state("scanning");
-    cola_turn(10, 1.0); /* after a scan, a head that was stopped stays so */
-    cola_head_state("idle");
-    protocol_rig_clear(&cola);
-    cola.ops->time(cola.protocol, 9000000000);
-    assert_int_equal(cola.n_lines, 0);
-}
-
-/* Another session stops the head. Scans that the head had made before still come, but no other follows them. */
-static void the_last_scans_of_a_stopped_head_are_not_enough(void **state)
-{
-    (void)state;
-    static const char *const when_asked[] = {"spin-down", "scanning"};
-    for (int i = 0; i < 2; i++) {
-        cola_open_lms();
-        cola_authorise();
-        cola_head_state(when_asked[i]);
-        cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 0");
-        cola_expect("sEN LMDscandata 1", "sEA LMDscandata 1");
-        cola_head_state("spin-down");
-        cola_turn(0, 1.0);
-        cola_turn(1, 1.0);
-        assert_int_equal(cola.n_units, 3);
-        cola_head_state("idle");
-        protocol_rig_clear(&cola);
-        cola.ops->time(cola.protocol, 400000000);
-        assert_int_equal(cola.n_lines, 2);
-        assert_string_equal(cola.line[1], "SCAN:START");
-        cola_head_state("scanning");
-        cola_turn(20, 1.0);
-        cola_head_state("idle");
-        protocol_rig_clear(&cola);
-        cola.ops->time(cola.protocol, 9000000000);
-        assert_int_equal(cola.n_lines, 0);
-    }
-}
-
-/* A scan of one turn has ended by itself when the turn is sent. Where the session has started that scan, it is done. */
-static void a_scan_that_ends_by_itself_is_enough(void **state)
-{
-    (void)state;
-    cola_open_lms();
-    cola_authorise();
-    cola_head_state("idle");
-    cola_expect("sMN LMCstartmeas", "sAN LMCstartmeas 0");
-    cola.descriptor.frames = 1;
-    cola.descriptor.scan++;
-    protocol_rig_describe(&cola, 0);
-    cola_head_state("spin-down");
-    cola_turn(0, 1.0);
-    cola_head_state("idle");
-    protocol_rig_clear(&cola);
-    cola.ops->time(cola.protocol, 9000000000);
-    assert_int_equal(cola.n_lines, 0);
-}
-
 /* ---- log-in */
 
 static void writing_needs_its_level(void **state)
@@ -440,9 +351,6 @@ int main(void)
         CASE(frames_are_those_of_real_scanners),
         CASE(mrpt_starts),
         CASE(states_follow_the_head),
-        CASE(a_resting_head_is_started),
-        CASE(the_last_scans_of_a_stopped_head_are_not_enough),
-        CASE(a_scan_that_ends_by_itself_is_enough),
         CASE(writing_needs_its_level),
         CASE(errors_have_their_numbers),
         CASE(a_geometry_that_the_head_has_not_is_refused),

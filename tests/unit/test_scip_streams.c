@@ -63,6 +63,24 @@ static void asked_while_it_stops(void **state)
     assert_int_equal(rig.n_lines, 0);
 }
 
+/* The session is at an earlier tick than the head, where the scan that the session has started is over. */
+static void a_scan_of_its_own_may_be_over_when_it_comes(void **state)
+{
+    (void)state;
+    static const struct protocol_rig_reply idle[] = {{"HEAD:STATE?", "idle", 0}, {NULL, NULL, 0}};
+    scip_open("UTM-30LX");
+    rig.replies = idle;
+    protocol_rig_input(&rig, "BM\n");
+    assert_int_equal(rig.n_lines, 2);
+    assert_string_equal(rig.line[1], "SCAN:START");
+    protocol_rig_input(&rig, "MD0000108001000\n");
+    rig.ops->time(rig.protocol, 100000000);
+    scip_turn(4);
+    rig.ops->time(rig.protocol, 9000000000);
+    for (uint32_t i = 2; i < rig.n_lines; i++)
+        assert_string_equal(rig.line[i], "HEAD:STATE?");
+}
+
 /* A turn that is left out in any case may be a broken one. */
 static void skipped_and_broken(void **state)
 {
@@ -334,6 +352,7 @@ int main(void)
         cmocka_unit_test(the_clock_wraps),
         cmocka_unit_test(speed_changes_within_a_turn),
         cmocka_unit_test(asked_while_it_stops),
+        cmocka_unit_test(a_scan_of_its_own_may_be_over_when_it_comes),
         cmocka_unit_test(skipped_and_broken),
         cmocka_unit_test(the_first_comes_at_once),
         cmocka_unit_test(played_malfunctions),
