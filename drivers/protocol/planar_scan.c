@@ -98,8 +98,8 @@ static uint32_t planar_scan_place_of(const struct planar_scan *s, uint32_t pan)
 
 /* ---- turns */
 
-/* Begins the turn that a frame of time t_ns belongs to, unless it is the one at hand. from_start: the frame has the first pulse of
- * its turn. */
+/* Begins the turn that a frame of time t_ns belongs to, unless it is the one at hand. from_start: the frame has the
+ * first pulse of its turn. */
 static void turn_to(struct planar_scan *s, int64_t t_ns, int64_t scan_t0_ns, uint32_t line, int64_t line_t0_ns,
                     int from_start, struct planar_news *news)
 {

@@ -18,7 +18,8 @@ void scan_wish_start(struct scan_wish *wish, int64_t t_ns)
     if (wish->lasts) wish->t_ns = t_ns;
 }
 
-/* A scan that begins within a turn has its first whole turn after two turns at most, and the head may have to spin up. */
+/* A scan that begins within a turn has its first whole turn after two turns at most, and the head may have
+ * to spin up. */
 int scan_wish_is_starting(const struct scan_wish *wish, const struct planar_scan *scan, int64_t now_ns)
 {
     static const int64_t SPIN_UP_NS = 100000000;

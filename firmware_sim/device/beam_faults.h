@@ -30,7 +30,8 @@ struct device_beam {
     struct device_disturbance now; /* the disturbance by all that strike together */
 };
 
-/* The schedule of a site's head with the settings of the scan, slowed by faults of its mirror. Sets the scan's rates. */
+/* The schedule of a site's head with the settings of the scan, slowed by faults of its mirror. Sets the scan's
+ * rates. */
 void device_fill_spec(struct device_beam *beam, const struct site *site, struct schedule_spec *spec);
 /* Takes over the rates of the scan's settings and faults from a pulse of the scan on. */
 void device_set_rates(struct device_beam *beam, uint64_t pulse);

@@ -6,8 +6,8 @@
  *   <device tick> <device time, ns> <session> <command line>
  * with decimal numbers and one blank between them. The command takes effect with that tick. The device time is that of
  * the last released tick, which the client has seen. It is after the tick's own time where the head gave up ticks that
- * were not claimed yet. The last line has the session 0 and END in place of a command: the run ended at that tick. This last line is missing where the head was killed. Other
- * lines that begin with '#' and empty lines are notes.
+ * were not claimed yet. The last line has the session 0 and END in place of a command: the run ended at that tick. This
+ * last line is missing where the head was killed. Other lines that begin with '#' and empty lines are notes.
  *
  * A thread writes the lines at once (line_writer.h), so the caller never waits for the file. Where the file is too
  * slow, commands are dropped: a line `LOST <n>` stands for n of them, and journal_read refuses such a file. For dropped

@@ -36,8 +36,8 @@ static void a_lost_end(void **state)
     assert_string_equal(warned, "the scan's end was lost; the head goes on without it\n");
 }
 
-/* If the final counts of a scan were lost, the next telemetry has them. It gets 2 s, and neither a signal nor the end of
- * the stream is delayed by the wait, or made a failure. */
+/* If the final counts of a scan were lost, the next telemetry has them. It gets 2 s, and neither a signal nor the end
+ * of the stream is delayed by the wait, or made a failure. */
 static void counts_that_are_due(void **state)
 {
     static const struct turn comes[] = {POINTS(100, 1),
