@@ -232,7 +232,7 @@ static void faults_of_a_file_say_where(void **state)
         {"x_m,y_m,z_m\n", "trees.csv: no copies below the first line"},
         {"x_m,y_m,z_m\n1,2,3\n\n1,2\n", "trees.csv, line 4: 2 values, but the first line names 3"},
         {"x_m,y_m,z_m\n1,2,x\n", "trees.csv, line 2: z_m is not a finite decimal number"},
-        {"x_m,y_m,z_m\n1,2,2e9\n", "trees.csv, line 2: z_m 2e+09; allowed -1e9 to 1e9 m"},
+        {"x_m,y_m,z_m\n1,2,1.1e9\n", "trees.csv, line 2: z_m 1.1e+09; allowed -1e9 to 1e9 m"},
         {"x_m,y_m,z_m,turn_deg\n1,2,2,0\n1,2,2,361\n", "trees.csv, line 3: turn_deg 361; allowed -360 to 360 deg"},
         {"x_m,y_m,z_m,scale\n1,2,2,0\n", "trees.csv, line 2: scale 0; allowed 0.001 to 1000"},
         {"x_m,y_m,z_m\n1e9,2,2\n", "trees.csv: copy 1 goes from"},
