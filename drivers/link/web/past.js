@@ -127,7 +127,8 @@ export class Past {
   }
 
   // Reads /past up to the live frames that were left to it. Before the first live frame nothing says how much there is,
-  // and a head at rest at the pace `fast` sends none. Then the page goes on asking: the head's observer may be late.
+  // and a head at rest at the pace `fast` sends none. Then the page goes on asking as long as there is patience: the
+  // head's observer may be late.
   async #read() {
     if (this.#isReading || this.#url === null) return;
     this.#isReading = true;
@@ -155,8 +156,10 @@ export class Past {
 
   async #readAll(goesOn) {
     this.#until_ms = performance.now() + PATIENCE_MS;
-    for (;;) {
+    for (let atEnd = false; ;) {
       const bytes = await this.#piece(goesOn);
+      // What comes after the end may be a new scan, and then the live frames go first.
+      if (atEnd && this.#need === null && bytes !== null && bytes.byteLength > HEAD) await this.#rest(NEWS_MS);
       if (!goesOn()) return;
       const head = bytes === null ? null : readHead(bytes);
       if (head === null) return this.#hasNone();
@@ -170,11 +173,14 @@ export class Past {
       }
       this.#push(bytes, head);
       const isAtEnd = head.next === head.end, isQuiet = this.#need === null;
-      if (!isAtEnd) this.#until_ms = performance.now() + PATIENCE_MS;
+      const hasNews = bytes.byteLength > HEAD;
+      if (!isAtEnd || (isQuiet && hasNews)) this.#until_ms = performance.now() + PATIENCE_MS;
       else if (!isQuiet && isBefore(this.#need, head.next_seq)) return this.decoder.flush(true);
-      if (bytes.byteLength > HEAD) this.#news_ms = performance.now();
+      if (hasNews) this.#news_ms = performance.now();
       const isLate = performance.now() > this.#until_ms, hasNoNews = performance.now() > this.#news_ms + NEWS_MS;
       if (isLate || (isQuiet && hasNoNews)) this.decoder.flush(true); // nothing follows the last frame, it seems
+      if (isLate && isQuiet) return;
+      atEnd = isAtEnd;
       await this.#rest(!isAtEnd ? REST_MS : isLate ? SELDOM_MS : AGAIN_MS);
       while (goesOn() && !this.#hasRoom()) await sleep(REST_MS);
       if (!goesOn()) return;
