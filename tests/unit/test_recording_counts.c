@@ -111,7 +111,7 @@ static void test_counts_without_an_end(void **state)
     assert_int_equal(c.scans, 1); /* nothing of the second one has come */
 }
 
-/* Of a scan 200 pulses are fired and 160 cast, 10 are lost by the head, and 100 come. So 50 are missing. A telemetry
+/* A scan fires 200 pulses and casts 160. The head loses 10 of these, and 100 come. So 50 are missing. A telemetry
  * within the scan says less. */
 static void begin(struct recording_counts *c, uint32_t scan)
 {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What a recording does where the end of a scan was lost, or the telemetry with its final counts. */
+/* A recording goes on where the end of a scan was lost, or the telemetry with its final counts. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

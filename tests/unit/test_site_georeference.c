@@ -113,7 +113,7 @@ static void the_worst_stretch_counts(void **state)
 }
 
 /* The tolerance lies between the errors of the two stretches, so that one needs a polynomial of second order. The
- * dearer polynomial is the path's, though its error is the smaller one. */
+ * path has the polynomial of the higher order, though its error is the smaller one. */
 static void the_costliest_stretch_counts(void **state)
 {
     (void)state;

@@ -6,16 +6,21 @@
 #include "drivers/protocol/native.h"
 #include "firmware_sim/command/head.h"
 
-/* What is known of a scan that ended. */
+/* The figures that are known of a scan that ended. */
 struct known {
     int is_final;
     uint64_t fired, cast, lost;
 };
 
+static uint64_t more_of(uint64_t a, uint64_t b)
+{
+    return a > b ? a : b;
+}
+
 /* The scan at hand is over. Where `cast` is less than the pulses received plus those lost, their sum counts instead. */
 static void recording_counts_end(struct recording_counts *c, const struct known *k)
 {
-    const uint64_t least = c->scan.pulses + k->lost, cast = k->cast > least ? k->cast : least;
+    const uint64_t least = c->scan.pulses + k->lost, cast = more_of(k->cast, least);
     c->scans++;
     c->fired += k->fired;
     c->cast += cast;
@@ -29,7 +34,6 @@ static void recording_counts_end(struct recording_counts *c, const struct known 
         c->due.fired = k->fired;
         c->due.cast = cast;
         c->due.lost = k->lost;
-        c->due.missing = cast - least;
     }
     c->ended = c->scan.number;
     c->within = 0;
@@ -39,21 +43,16 @@ static void recording_counts_end(struct recording_counts *c, const struct known 
 /* The final counts of the scan that is due have come: they replace what was counted. */
 static void correct(struct recording_counts *c, const struct native_telemetry *t)
 {
-    const uint64_t least = c->due.pulses + t->scan_lost, cast = t->scan_cast > least ? t->scan_cast : least;
+    const uint64_t least = c->due.pulses + t->scan_lost, cast = more_of(t->scan_cast, least);
     c->fired += t->scan_fired - c->due.fired;
     c->cast += cast - c->due.cast;
     c->lost += t->scan_lost - c->due.lost;
-    c->missing += cast - least - c->due.missing;
+    c->missing += cast - least - (c->due.cast - c->due.pulses - c->due.lost);
     c->unknown--;
     memset(&c->due, 0, sizeof c->due);
 }
 
-static uint64_t more_of(uint64_t a, uint64_t b)
-{
-    return a > b ? a : b;
-}
-
-/* What telemetry and events say of the scan at hand: at least that much. */
+/* Telemetry and events say at least so much of the scan at hand. */
 static struct known known_so_far(const struct recording_counts *c)
 {
     const int is_told = c->told.scan != 0 && c->told.scan == c->scan.number;

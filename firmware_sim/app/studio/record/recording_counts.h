@@ -35,7 +35,7 @@ struct recording_counts {
     } told; /* by the last telemetry */
     struct {
         uint32_t scan; /* 0: none */
-        uint64_t pulses, fired, cast, lost, missing;
+        uint64_t pulses, fired, cast, lost;
     } due;          /* the scan that ended last, as it was counted, while its final counts may still come */
     uint32_t ended; /* number of the last scan that ended, until the next one begins */
 };
