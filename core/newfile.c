@@ -42,7 +42,7 @@ static int newfile_fail(const char *path, const char *what, struct sh_err *err)
 
 /* ---- files that must not be written to */
 
-static int fail_link(const char *path, struct sh_err *err)
+int newfile_fail_link(const char *path, struct sh_err *err)
 {
     char to[200];
     ssize_t n = readlink(path, to, sizeof to - 1);
@@ -83,7 +83,7 @@ static int check_target(const char *path, struct sh_err *err)
 {
     struct stat st;
     if (lstat(path, &st) != 0) return errno == ENOENT ? SH_OK : newfile_fail(path, "create", err);
-    if (S_ISLNK(st.st_mode)) return fail_link(path, err);
+    if (S_ISLNK(st.st_mode)) return newfile_fail_link(path, err);
     if (!S_ISREG(st.st_mode))
         return sh_fail(err, SH_EINPUT, "%s: is a %s; allowed is a regular file, or a name that doesn't exist", path,
                        kind_of(st.st_mode));
@@ -186,7 +186,7 @@ int newfile_open(const char *path, int *out, struct sh_err *err)
     if (fd < 0 && errno == ELOOP) {
         struct stat st;
         const int n = number_of(path);
-        if (n < 0) return fail_link(path, err);
+        if (n < 0) return newfile_fail_link(path, err);
         /* A shell's `>FILE` is a regular file. A duplicate of its descriptor shares the offset with other writers. */
         is_shared = fstat(n, &st) == 0 && S_ISREG(st.st_mode);
         fd = is_shared ? fcntl(n, F_DUPFD_CLOEXEC, 0) : open(path, flags, 0666);
@@ -239,7 +239,7 @@ static int open_part(const char *part, int *fd, struct sh_err *err)
     if (errno != EEXIST) return newfile_fail(part, "create", err);
     *fd = open(part, O_RDWR | PLAIN);
     if (*fd < 0 && errno == ENOENT) return 0;
-    if (*fd < 0 && errno == ELOOP) return fail_link(part, err);
+    if (*fd < 0 && errno == ELOOP) return newfile_fail_link(part, err);
     if (*fd < 0) return newfile_fail(part, "create", err);
     int rc = check_left(part, *fd, err);
     if (rc != SH_OK) close(*fd);

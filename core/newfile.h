@@ -41,6 +41,8 @@ int newfile_replace(const char *path, int *fd, newfile_put *put, const void *sou
 /* Before long work: checks whether newfile_part would make `path`, with `path`.part as its part. The check leaves no
  * file behind: a part that a killed writer has left is removed. */
 int newfile_check(const char *path, struct sh_err *err);
+/* Says in err that the path is a symbolic link, and where it leads. Returns SH_EINPUT. */
+int newfile_fail_link(const char *path, struct sh_err *err);
 /* Opens the `part` that a killed writer has left: an existing regular file, for reading and writing, locked as
  * newfile_part does. SH_EINPUT: there is none; SH_ESTATE: it is still being written. */
 int newfile_left(const char *part, int *fd, struct sh_err *err);

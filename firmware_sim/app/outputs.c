@@ -7,9 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include "core/grow.h"
+#include "core/newfile.h"
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/sidecars.h"
 #include "firmware_sim/config/config.h"
@@ -199,14 +199,11 @@ static int add_all(struct files *f, const struct app_input *in, const struct con
 static int check_link(const struct named *file, struct sh_err *err)
 {
     struct stat st;
-    char to[200];
+    struct sh_err why;
     const int is_of_system = strncmp(file->path, "/dev/", 5) == 0 || strncmp(file->path, "/proc/", 6) == 0;
     if (is_of_system || lstat(file->path, &st) != 0 || !S_ISLNK(st.st_mode)) return SH_OK;
-    const ssize_t n = readlink(file->path, to, sizeof to - 1);
-    to[n > 0 ? n : 0] = '\0';
-    return sh_fail(err, SH_EINPUT,
-                   "%s %s: is a symbolic link to %s; links are not followed: remove it, or give its target", file->who,
-                   file->path, to);
+    newfile_fail_link(file->path, &why);
+    return sh_fail(err, why.code, "%s %s", file->who, why.text);
 }
 
 /* Some files are made at the end of long work. A missing folder shows now. */
