@@ -6,6 +6,7 @@
 
 #include "firmware_sim/device/device_state.h"
 
+_Static_assert((int)COMMAND_MAX_LINE == (int)NATIVE_MAX_COMMAND, "clients send what the head takes, and no more");
 _Static_assert((int)COMMAND_PEERS == (int)DEVICE_MAX_SESSIONS + 1, "each session has a place for its client's name");
 
 /* Gives a scan those of the present settings that may change within it. A step of the next scan stays away, and so do
