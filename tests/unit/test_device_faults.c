@@ -386,44 +386,6 @@ static void reboots_by_command(void **state)
     rig_close(rig);
 }
 
-static void expect_error(const struct command_result *result, int error, const char *reply)
-{
-    if (result->error != error || strcmp(result->reply, reply) != 0) fail_msg("%d: %s", result->error, result->reply);
-    if (error != 0) assert_int_equal(result->effect, COMMAND_NONE);
-}
-
-/* Power takes each change away that comes after HEAD:REBoot has been answered, so none is answered OK. The claim that
- * turns power off may be far ahead of what clients have seen: sessions of other protocols still have to answer then. */
-static void refuses_changes_once_it_reboots(void **state)
-{
-    (void)state;
-    static const char *const changes[] = {"HEAD:LINES 40",          "SCAN:START",     "*RST",         "HEAD:REBOOT",
-                                          "SITE:POSE 1, DEF",       "HEAD:STORE",     "TIME:SHIFT 1", "SYST:CONT:TAKE",
-                                          "FAULt:ADD {kind: drop}", "FAULt:CLEar ALL"};
-    struct command_result result;
-    struct rig *rig = rig_open(NULL, NULL, 0);
-    rig_go_to(rig, 300);
-    assert_string_equal(rig_tell(rig, "HEAD:REBOOT", 290), "OK");
-    for (int claimed = 0; claimed < 2; claimed++) {
-        for (size_t i = 0; i < sizeof changes / sizeof changes[0]; i++) {
-            device_command_once(rig->device, 1, changes[i], 290, &result);
-            if (strncmp(result.reply, "ERR -221,", 9) != 0) fail_msg("%s: %s", changes[i], result.reply);
-            assert_int_equal(result.effect, COMMAND_NONE);
-            device_command(rig->device, 1, changes[i], 290, &result);
-            if (claimed) expect_error(&result, 0, ""); /* this session is about to be cut off */
-            if (!claimed && strncmp(result.reply, "ERR -221,", 9) != 0) fail_msg("%s: %s", changes[i], result.reply);
-        }
-        device_command_once(rig->device, 1, "HEAD:LINES 40", 290, &result);
-        expect_error(&result, CMD_E_SETTINGS,
-                     claimed ? "ERR -221,\"Settings conflict; the head has no power\""
-                             : "ERR -221,\"Settings conflict; the head reboots\"");
-        device_command_once(rig->device, 1, "HEAD:LINES?", 290, &result);
-        expect_error(&result, 0, "100");
-        assert_true(rig_claim(rig));
-    }
-    rig_close(rig);
-}
-
 static void counts_from_near_the_wrap(void **state)
 {
     (void)state;
@@ -471,7 +433,6 @@ int main(void)
         cmocka_unit_test(drifts_until_it_is_cleared),
         cmocka_unit_test(is_replayed),
         cmocka_unit_test(reboots_by_command),
-        cmocka_unit_test(refuses_changes_once_it_reboots),
         cmocka_unit_test(counts_from_near_the_wrap),
         cmocka_unit_test(needs_a_time_of_day),
     };
