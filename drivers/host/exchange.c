@@ -7,7 +7,7 @@
 
 #include "drivers/host/exchange.h"
 
-enum { COMMAND_MAX = 1024, STALE_READS = 32, ANSWERS_MS = 200, ASK_AGAIN_MS = 1000 };
+enum { STALE_READS = 32, ANSWERS_MS = 200, ASK_AGAIN_MS = 1000 };
 
 /* Keeps the frames that are in the parser. Returns 1 if the parser is at a line, 0 if it needs more bytes. Negative: an
  * error. */
@@ -135,9 +135,9 @@ static int check_command(struct scanhead *sh, const char *command, size_t len)
         if (command[i] != ' ') blank = 0;
         if (command[i] < 0x20 || command[i] > 0x7e) printable = 0;
     }
-    if (blank || !printable || len > COMMAND_MAX)
-        return sh_fail(&sh->err, SCANHEAD_EINPUT, "not a command: one line of at most %d printable ASCII characters",
-                       COMMAND_MAX);
+    if (blank || !printable || len > NATIVE_MAX_COMMAND)
+        return sh_fail(&sh->err, SCANHEAD_EINPUT, "not a command: one line of 1 to %d printable ASCII characters",
+                       NATIVE_MAX_COMMAND);
     return 0;
 }
 
@@ -215,7 +215,7 @@ static void give_up(struct scanhead *sh, const char *command)
 
 int scanhead_command(struct scanhead *sh, const char *command, char *reply, size_t reply_len, int timeout_ms)
 {
-    char line[COMMAND_MAX + 1];
+    char line[NATIVE_MAX_COMMAND + 1];
     size_t len = strlen(command);
     sh->payload = NULL;
     sh->has_no_limit = timeout_ms < 0;

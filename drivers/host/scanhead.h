@@ -96,12 +96,12 @@ struct scanhead_usb_head {
 /* Describes at most max heads on USB. Returns how many there are, or SCANHEAD_EIO with the reason in err (or NULL). */
 int scanhead_list_usb(struct scanhead_usb_head *heads, int max, char *err, size_t err_len);
 
-/* Sends one command line and waits for its reply line, which comes without its line end. Frames that arrive meanwhile
- * are kept, and scanhead_next() gives them later. At most 64 MiB of frames are kept; then the oldest are dropped and
- * counted (stats.dropped). A reply "ERR n,..." is returned as it is, with SCANHEAD_OK: the command was answered. Before
- * the first command on a "tty:" the library sends an empty line and *IDN?. It skips all reply lines up to the answer,
- * because the terminal may have echoed the head's own bytes to the head. It does the same after a command that ended
- * without its reply, since that reply may still come. */
+/* Sends one command line of 1 to 256 printable ASCII characters, without its line end, and waits for its reply line,
+ * which comes without its line end, too. Another line gives SCANHEAD_EINPUT. Frames that arrive meanwhile are kept, and
+ * scanhead_next() gives them later. At most 64 MiB of frames are kept; then the oldest are dropped and counted
+ * (stats.dropped). A reply "ERR n,..." is returned as it is, with SCANHEAD_OK: the command was answered. Before the
+ * first command on a "tty:" the library sends an empty line and *IDN?, and skips all reply lines up to the answer: the
+ * terminal may have echoed the head's own bytes to the head. It does the same after a command without its reply. */
 int scanhead_command(struct scanhead *sh, const char *command, char *reply, size_t reply_len, int timeout_ms);
 
 enum scanhead_frame_type { /* as on the wire */

@@ -147,6 +147,14 @@ static void absorb_time(struct scanhead *sh, const struct native_event *event)
     if (event->code == NATIVE_EV_PPS) set_gps(sh, event->b, event->c * 1000000000u);
 }
 
+/* A SCAN_START with the descriptor's number is of another scan if that scan has another start: the head has started
+ * again. The event of the scan at hand can come after its first points, where the head lost the tick with it. */
+static int is_other_scan(const struct scanhead *sh, const struct native_event *start)
+{
+    if (!sh->have_descriptor) return 0;
+    return start->a != sh->descriptor.scan || (sh->have_pulse && (int64_t)start->b != sh->times.scan_t0_ns);
+}
+
 void host_count_reader_lost(struct scanhead *sh, uint64_t n)
 {
     if (n < sh->reader_lost) sh->reader_lost_before += sh->reader_lost;
@@ -160,7 +168,7 @@ static int absorb_event(struct scanhead *sh, const struct native_header *header,
     if (event.code == NATIVE_EV_READER_LOST) host_count_reader_lost(sh, event.c);
     if (event.code == NATIVE_EV_OVERRUN) sh->pulses_lost_told += event.b;
     if (event.code == NATIVE_EV_SCAN_END) sh->pulses_lost_ended += event.c;
-    if (event.code == NATIVE_EV_SCAN_START && sh->have_descriptor && event.a != sh->descriptor.scan) forget(sh);
+    if (event.code == NATIVE_EV_SCAN_START && is_other_scan(sh, &event)) forget(sh);
     absorb_time(sh, &event);
     return 0;
 }

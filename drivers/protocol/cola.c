@@ -14,7 +14,7 @@ int cola_power_up(struct cola *self, struct sh_err *err)
     self->level = COLA_RUN;
     self->measures = 1;
     self->streams = self->started = self->reboots = self->next.is_due = 0;
-    scan_wish_reset(&self->wish);
+    scan_wish_reset(&self->wish, self->spec.identity);
     self->n_waiting = self->since_sent = 0;
     self->telegrams = (uint16_t)(0U - self->spec.near_wrap);
     const int rc = cola_restore(self, err);

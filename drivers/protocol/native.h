@@ -31,7 +31,8 @@ enum {
     NATIVE_COLOURS_HEAD_LEN = NATIVE_ATTRIBUTES_HEAD_LEN,
     NATIVE_COLOUR_LEN = 3,
     NATIVE_SURFACES_HEAD_LEN = 8,
-    NATIVE_MAX_TEXT = 512, /* longest reply line, with its CR LF */
+    NATIVE_MAX_TEXT = 512,    /* longest reply line, with its CR LF */
+    NATIVE_MAX_COMMAND = 256, /* longest command line, without its end */
 };
 
 enum native_type {

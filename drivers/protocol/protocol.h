@@ -135,6 +135,7 @@ struct protocol_identity {
         uint32_t steps;
     } geometry[PROTOCOL_MAX_GEOMETRIES];
     uint32_t n_geometries;
+    int64_t spin_up_ns;               /* from SCAN:STARt to the mirror's speed; 0: a recording */
     const struct cola_fields *fields; /* monitored fields and inputs of the configuration; NULL: none */
 };
 

@@ -12,7 +12,7 @@ static void scip_power_up(struct scip *s)
     s->bit_rate = s->model->bit_rate;
     s->rb_ns = s->reboot_ns = INT64_MIN;
     s->stream.active = s->single.active = 0;
-    scan_wish_reset(&s->wish);
+    scan_wish_reset(&s->wish, s->identity);
     s->simulation = (struct scip_simulation){0};
     s->n_line = 0;
     s->is_over = s->foul = 0;

@@ -9,10 +9,13 @@ struct scan_count { /* begins as zeros */
     uint64_t n_scans;
     uint32_t number; /* of the last descriptor's scan; 0: none yet */
     int64_t t_ns;    /* of the last descriptor */
+    int has_points;  /* points came since a scan was counted, of a scan that began at begin_ns */
+    int64_t begin_ns;
 };
 
 /* Takes each whole frame of a .shs or .pcapng, in order. A scan begins with a descriptor of another scan, or with
- * points before any descriptor. A descriptor of the same scan says that settings have changed within it. */
+ * points before any descriptor, or with a SCAN_START of the same number and another start. A descriptor of the same
+ * scan says that settings have changed within it. */
 void scan_count_frame(struct scan_count *count, const uint8_t *frame);
 
 struct point_scans { /* begins as zeros */

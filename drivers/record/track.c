@@ -92,9 +92,9 @@ static void set_pose(struct track *t)
         station_pose_of(&t->info, &t->pose);
 }
 
-/* A scan of the file begins with a descriptor that is no repetition, pulses that go back, or another station or scan.
- * Any of these will do, since frames may be lost. Such a descriptor also comes when settings change within a scan:
- * rows and columns stand for other angles then, and scales may be others. */
+/* A scan of the file begins with a descriptor that is no repetition, pulses that go back, another station or scan, or a
+ * SCAN_START with another start. Any of these will do, since frames may be lost. Such a descriptor also comes when
+ * settings change within a scan: rows and columns stand for other angles then, and scales may be others. */
 static int begins_scan(const struct track *t, const struct scanhead_frame *frame)
 {
     return t->n_scans == 0 || t->state.new_scan || frame->pulse0 < t->state.last_pulse0 ||
@@ -257,6 +257,7 @@ static int track_take_points(struct track *t, const struct scanhead_frame *frame
     t->state.last_pulse0 = frame->pulse0;
     t->state.last_station = t->info.station;
     t->state.last_scan = t->info.scan;
+    t->state.last_begin_ns = (int64_t)((uint64_t)frame->t_ns - (uint64_t)frame->scan_t0_ns);
     uint64_t row = first_row(t, frame);
     if (rc == 0) rc = track_begin_waiting(t, frame, row, err);
     if (rc == 0 && row > UINT32_MAX - frame->n_points)
@@ -271,6 +272,15 @@ static void take_line_end(struct track *t, const struct scanhead_frame *frame)
     if (!t->state.have_next_line) return;
     t->state.next_line = end.line + 1;
     t->state.next_line_pulse0 = end.pulse0 + end.n_fired;
+}
+
+/* A scan with another start is another one, also where it has the number of the last one and its first descriptor was
+ * lost. The event of the scan at hand can come after its first points. */
+static void take_scan_start(struct track *t, const struct scanhead_frame *frame)
+{
+    if ((int64_t)frame->event_value[1] == t->state.last_begin_ns) return;
+    t->state.new_scan = 1;
+    t->state.have_next_line = 0;
 }
 
 int track_frame(struct track *t, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
@@ -288,6 +298,7 @@ int track_frame(struct track *t, struct scanhead *sh, const struct scanhead_fram
     if (frame->type == SCANHEAD_DESCRIPTOR && native_decode_descriptor(frame->payload, frame->payload_len, &d) == 0)
         set_limits(t, &d);
     if (frame->type == SCANHEAD_EMITTER) set_emitter_limits(t);
+    if (frame->type == SCANHEAD_EVENT && frame->event == SCANHEAD_EV_SCAN_START) take_scan_start(t, frame);
     if (frame->type == SCANHEAD_DESCRIPTOR && (frame->flags & SCANHEAD_REPEAT) == 0) {
         t->state.new_scan = 1;
         t->state.have_next_line = 0;

@@ -75,6 +75,7 @@ struct track_state {
     int new_scan, have_next_line;
     uint32_t next_line, last_station, last_scan;
     uint64_t next_line_pulse0, last_pulse0;
+    int64_t last_begin_ns; /* device time of pulse 0 of the scan of the last points */
 };
 
 struct track {

@@ -155,6 +155,7 @@ struct command_phase {
 /* The recording that is replayed. Times count from its first frame. */
 struct command_replay {
     int is_there;            /* 0: a head, or a capture of packets */
+    int plays;               /* after the last command, which may not have been carried out yet */
     double position_s;       /* of the frame that was sent last */
     double length_s;         /* 0: not known */
     double speed;            /* 0: it is paused */

@@ -26,8 +26,8 @@ int command_replay_query(struct command_call *call)
     if (call->param[0] != '\0')
         return command_fail(call, CMD_E_NOT_ALLOWED, "%s? takes no parameter", call->row->header);
     if (!r->is_there) return command_reply(call, "NONE");
-    return command_reply(call, "%s,%.6f,%.6f,%.10g,%s", call->dev->is_played ? "PLAYING" : "IDLE",
-                         whole_us(r->position_s), whole_us(r->length_s), r->speed, r->loop ? "ON" : "OFF");
+    return command_reply(call, "%s,%.6f,%.6f,%.10g,%s", r->plays ? "PLAYING" : "IDLE", whole_us(r->position_s),
+                         whole_us(r->length_s), r->speed, r->loop ? "ON" : "OFF");
 }
 
 /* Reads a number of at least 0. An empty field leaves the value. */

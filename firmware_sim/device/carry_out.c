@@ -6,6 +6,7 @@
 
 #include "firmware_sim/device/device_state.h"
 
+_Static_assert((int)COMMAND_MAX_LINE == (int)NATIVE_MAX_COMMAND, "clients send what the head takes, and no more");
 _Static_assert((int)COMMAND_PEERS == (int)DEVICE_MAX_SESSIONS + 1, "each session has a place for its client's name");
 
 /* Gives a scan those of the present settings that may change within it. A step of the next scan stays away, and so do
@@ -89,21 +90,30 @@ static const char *why_fixed(const struct device *device, uint32_t session)
     return session != 0 && replays ? "a journal is being replayed" : site_why_fixed(device->site);
 }
 
-/* Carries out a command while power is gone. The old sessions are cut off when the tick without power is released, and
- * get no further answer. In the pace `step` links are back at once, so that new sessions can come while power is gone.
- * The new sessions may send queries and steps. */
-static void do_dead(struct device *device, uint32_t session, const char *line, uint64_t released,
+/* Why a session can change nothing: its change would be gone with the power. NULL: it can. */
+static const char *why_dead(const struct device *device, uint64_t released)
+{
+    if (device->power.reboots) return "the head reboots";
+    return device_is_dead(device, released) ? "the head has no power" : NULL;
+}
+
+/* Answers a command while power is gone, or is about to go since HEAD:REBoot has been answered. The old sessions are
+ * cut off when the tick without power is released. Meanwhile native sessions get no further answer; others have to
+ * answer, and learn why a change is refused. In the pace `step` links are back at once, so that new sessions can come
+ * while power is gone. The new sessions may send queries and steps. */
+static void do_dead(struct device *device, uint32_t session, const char *line, const char *why,
                     struct command_result *out)
 {
-    memset(out, 0, sizeof *out);
-    if (released < device->power.off_tick) return;
     struct command_device *cmd = malloc(sizeof *cmd);
     if (cmd == NULL) return;
     *cmd = device->cmd;
     cmd->faults = &fault_desk_queries; /* the copy must not change the device's own faults */
     command_execute(cmd, session, line, out);
     const int is_act = out->changes || out->effect == COMMAND_TAKE;
-    if (is_act && out->effect != COMMAND_STEP) command_refuse(cmd, CMD_E_SETTINGS, "the head has no power", out);
+    if (is_act && out->effect != COMMAND_STEP) {
+        memset(out, 0, sizeof *out);
+        command_refuse(cmd, CMD_E_SETTINGS, why, out);
+    }
     free(cmd);
 }
 
@@ -127,8 +137,11 @@ static void do_command(struct device *device, uint32_t session, const char *line
     cmd->lost_journal_lines = atomic_load(&device->counters.lost_journal_lines);
     cmd->lost_truth_lines = atomic_load(&device->counters.lost_truth_lines);
     device_set_time_texts(device);
-    if (session != 0 && device_is_dead(device, released)) {
-        do_dead(device, session, line, released, out);
+    const char *dead = session != 0 ? why_dead(device, released) : NULL;
+    if (dead != NULL) {
+        const int is_cut_off = !device->power.reboots && released < device->power.off_tick;
+        memset(out, 0, sizeof *out);
+        if (once || !is_cut_off) do_dead(device, session, line, dead, out);
         return;
     }
     command_execute(cmd, session, line, out);

@@ -202,8 +202,7 @@ void device_before_scans(struct device *device)
 
 void device_describe(struct device *device, struct device_work *work)
 {
-    /* At rest the descriptor has the echoes and the waveforms of the next scan. */
-    const struct head_settings *settings = device->scan.on ? &device->scan.settings : &device->cmd.settings;
+    const struct head_settings *settings = &device->scan.settings; /* at rest those of the last scan (PROTOCOL.md) */
     work->describe = 1;
     work->describe_flags = device->scan.describe ? 0 : NATIVE_REPEAT;
     device_fill_descriptor(&device->scan, device->idn, settings->waves, &work->descriptor);

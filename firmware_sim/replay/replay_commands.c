@@ -143,6 +143,7 @@ static void do_command(struct replay *r, uint32_t session, const char *line, uin
     r->cmd.frames_done = r->frames_done;
     r->cmd.lost_truth_lines = atomic_load(&r->counters.lost_truth_lines);
     r->cmd.is_played = r->playing || r->wants_start || r->wants_again || r->wants_seek;
+    r->cmd.replay.plays = r->wants_start || r->wants_seek || (!r->wants_stop && (r->playing || r->wants_again));
     r->cmd.replay.position_s = 1e-9 * (double)r->position_ns;
     if (r->wants_seek) r->cmd.replay.position_s = r->seek_s;
     r->cmd.replay.speed = r->speed;

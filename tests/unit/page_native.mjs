@@ -317,6 +317,22 @@ test('another sequence: its points have no place before its own descriptor and a
   equal(again.decoder.stats.unplaced_shots, 3, 'after a repeated descriptor without its anchor');
 });
 
+test('a SCAN_START of the same number: points have no place before the new anchor, if the scan has another start', () => {
+  const [d, a, p] = [1, 2, 3].map((type) => Buffer.from(samples.find(({bytes}) => bytes[1] === type).bytes));
+  const event = Buffer.from(samples.find(({bytes}) => bytes[1] === 6).bytes), begin_ns = p.readBigInt64LE(16) - p.readBigInt64LE(28 + 16);
+  event.writeUInt32LE(2, 28);
+  event.writeBigUInt64LE(BigInt(d.readUInt32LE(28 + 260)), 28 + 8);
+  for (const [later_ns, unplaced] of [[0n, 0], [1n, 3], [-1n, 3]]) {
+    event.writeBigInt64LE(begin_ns + later_ns, 28 + 16);
+    const frames = [d, a, p, event, p].map((frame, seq) => {
+      const copy = Buffer.from(frame);
+      copy.writeUInt32LE(seq, 8);
+      return signed(copy);
+    });
+    equal(readAll(frames).decoder.stats.unplaced_shots, unplaced, `a start ${later_ns} ns later`);
+  }
+});
+
 // ---- recordings beside the client in Python
 
 // Tolerances are relative to the length of the place. Polar has the same operations, but sine and cosine of another

@@ -135,6 +135,12 @@ test('where a scan ends, with SCAN_END and without, and what is missing of it', 
     'scan 1 null null null 100 null; scan 2 9 null 0 100 null', 'the next scan');
   equal(lossesOf(start, d(1), points, ['restarted', {}], start, d(1), points, telemetry(5, 1), end),
     `scan 1 null null null 100 null; ${whole}`, 'another sequence, whose scan has the same number');
+  const begun = ['points', {scan: 1, began_s: 2.5}], started = (at_ns) => event('SCAN_START', {scan: 1, at_ns});
+  equal(lossesOf(d(1), begun, started(2500000000n), begun, telemetry(5, 1), end), 'scan 1 130 120 7 200 -87', 'the scan at hand, late');
+  for (const at_ns of [2400000000n, 2500002000n]) {
+    equal(lossesOf(started(2500000000n), d(1), begun, telemetry(4, 1), started(at_ns), d(1), points, telemetry(5, 1), end),
+      `scan 1 null null null 100 null; ${whole}`, 'another start: another scan of the same number');
+  }
   // The final counts that were lost come with the next telemetry of the same scan: 120 - 7 - 100 pulses are missing.
   for (const [state, scan, missing] of [[2, 1, 13], [5, 1, 13], [3, 1, 13], [4, 1, 0], [2, 2, 0]]) {
     const late = new Losses(() => {});

@@ -135,6 +135,25 @@ static void a_scan_of_its_own_may_be_over_when_it_comes(void **state)
     }
 }
 
+/* The mirror takes 3 s to its speed, and the session is behind the head, where the scan is over by then. Two turns take
+ * 80 ms. Only after that a scan that has not come is one that somebody has stopped. */
+static void a_slow_mirror_is_started_once(void **state)
+{
+    (void)state;
+    for (int comes = 0; comes < 2; comes++) {
+        cola_open_lms();
+        cola.identity.spin_up_ns = 3000000000;
+        cola_authorise();
+        cola_head_state("idle");
+        cola.ops->time(cola.protocol, 1000000000);
+        cola_expect("sEN LMDscandata 1", "sEA LMDscandata 1");
+        assert_int_equal(starts_until(1000000000, 4080000000), 1);
+        cola.scan_t0_ns = 4080000000;
+        if (comes) cola_turn(0, 1.0);
+        assert_int_equal(starts_until(4120000000, 4500000000), !comes);
+    }
+}
+
 /* The session has started the scan that another session stops, but had its turns before it asked for scans again. */
 static void a_scan_of_its_own_from_before_is_not_enough(void **state)
 {
@@ -184,6 +203,7 @@ int main(void)
         CASE(the_last_scans_of_a_stopped_head_are_not_enough),
         CASE(a_scan_that_ends_by_itself_is_enough),
         CASE(a_scan_of_its_own_may_be_over_when_it_comes),
+        CASE(a_slow_mirror_is_started_once),
         CASE(a_scan_of_its_own_from_before_is_not_enough),
         CASE(a_later_scan_of_another_is_enough),
     };

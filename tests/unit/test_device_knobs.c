@@ -285,6 +285,31 @@ static void a_step_of_the_next_scan_leaves_the_last_pulses_alone(void **state)
         stop_a_scan(&rows[i]);
 }
 
+/* PROTOCOL.md: between scans the description is that of the last scan, and before the first one that of power-up. What
+ * the next scan sends of a pulse comes with the next scan. */
+static void a_description_at_rest_is_of_the_last_scan(void **state)
+{
+    (void)state;
+    struct rig *rig = open_planar(NULL);
+    rig_go_to(rig, BOOTED);
+    rig_tell(rig, "SCAN:ECHOES LAST", BOOTED);
+    rig_go_to(rig, 1001);
+    assert_true(rig->work.describe && rig->work.emitter.echoes == NATIVE_ECHOES_ALL);
+    rig_tell(rig, "SCAN:START", 1000);
+    rig_wait(rig, NATIVE_EV_SCAN_START, 300);
+    assert_int_equal(rig->work.emitter.echoes, NATIVE_ECHOES_LAST);
+    rig_tell(rig, "SCAN:STOP", rig->next);
+    rig_wait(rig, NATIVE_EV_SCAN_END, 300);
+    rig_tell(rig, "SCAN:ECHOES FIRST", rig->next);
+    rig_go_to(rig, 2001);
+    assert_true(rig->work.describe && rig->work.describe_flags == NATIVE_REPEAT);
+    assert_int_equal(rig->work.emitter.echoes, NATIVE_ECHOES_LAST);
+    rig_tell(rig, "SCAN:START", 2000);
+    rig_wait(rig, NATIVE_EV_SCAN_START, 300);
+    assert_int_equal(rig->work.emitter.echoes, NATIVE_ECHOES_FIRST);
+    rig_close(rig);
+}
+
 /* A scan from power-up begins at tick 230, in ticks that are claimed ahead. The client still sees the boot, which
  * allows a step of the next scan. */
 static void a_step_in_the_boot_leaves_the_claimed_scan_alone(void **state)
@@ -332,6 +357,7 @@ int main(void)
         cmocka_unit_test(what_can_not_be_is_refused),
         cmocka_unit_test(a_head_settles_after_a_command),
         cmocka_unit_test(a_step_of_the_next_scan_leaves_the_last_pulses_alone),
+        cmocka_unit_test(a_description_at_rest_is_of_the_last_scan),
         cmocka_unit_test(a_step_in_the_boot_leaves_the_claimed_scan_alone),
         cmocka_unit_test(a_reset_leaves_the_last_pulses_their_echoes),
     };

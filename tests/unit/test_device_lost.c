@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Ticks that the head could not compute in time: their events are reported again. */
+/* What is lost: ticks that the head could not compute in time, whose events are reported again; changes before power
+ * goes, which are refused. */
 #include "tests/unit/device_rig.h"
 
 static void a_lost_tick_says_its_events_again(void **state)
@@ -79,12 +80,51 @@ static void a_head_without_power_forgets_what_it_had_to_say(void **state)
     rig_close(rig);
 }
 
+static void expect_error(const struct command_result *result, int error, const char *reply)
+{
+    if (result->error != error || strcmp(result->reply, reply) != 0) fail_msg("%d: %s", result->error, result->reply);
+    if (error != 0) assert_int_equal(result->effect, COMMAND_NONE);
+}
+
+/* Power takes each change away that comes after HEAD:REBoot has been answered, so none is answered OK. The claim that
+ * turns power off may be far ahead of what clients have seen: sessions of other protocols still have to answer then. */
+static void refuses_changes_once_it_reboots(void **state)
+{
+    (void)state;
+    static const char *const changes[] = {"HEAD:LINES 40",          "SCAN:START",     "*RST",         "HEAD:REBOOT",
+                                          "SITE:POSE 1, DEF",       "HEAD:STORE",     "TIME:SHIFT 1", "SYST:CONT:TAKE",
+                                          "FAULt:ADD {kind: drop}", "FAULt:CLEar ALL"};
+    struct command_result result;
+    struct rig *rig = rig_open(NULL, NULL, 0);
+    rig_go_to(rig, 300);
+    assert_string_equal(rig_tell(rig, "HEAD:REBOOT", 290), "OK");
+    for (int claimed = 0; claimed < 2; claimed++) {
+        for (size_t i = 0; i < sizeof changes / sizeof changes[0]; i++) {
+            device_command_once(rig->device, 1, changes[i], 290, &result);
+            if (strncmp(result.reply, "ERR -221,", 9) != 0) fail_msg("%s: %s", changes[i], result.reply);
+            assert_int_equal(result.effect, COMMAND_NONE);
+            device_command(rig->device, 1, changes[i], 290, &result);
+            if (claimed) expect_error(&result, 0, ""); /* this session is about to be cut off */
+            if (!claimed && strncmp(result.reply, "ERR -221,", 9) != 0) fail_msg("%s: %s", changes[i], result.reply);
+        }
+        device_command_once(rig->device, 1, "HEAD:LINES 40", 290, &result);
+        expect_error(&result, CMD_E_SETTINGS,
+                     claimed ? "ERR -221,\"Settings conflict; the head has no power\""
+                             : "ERR -221,\"Settings conflict; the head reboots\"");
+        device_command_once(rig->device, 1, "HEAD:LINES?", 290, &result);
+        expect_error(&result, 0, "100");
+        assert_true(rig_claim(rig));
+    }
+    rig_close(rig);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_lost_tick_says_its_events_again),
         cmocka_unit_test(a_lost_overrun_is_said_with_the_next),
         cmocka_unit_test(a_head_without_power_forgets_what_it_had_to_say),
+        cmocka_unit_test(refuses_changes_once_it_reboots),
     };
     return cmocka_run_group_tests_name("device lost", tests, make_folder, remove_folder);
 }

@@ -119,8 +119,18 @@ static void test_new_scan_forgets(void **state)
     for (int i = 0; i < 3; i++)
         assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);
     assert_int_equal(scanhead_points(sh, &f, 0, &p, 1), 1);
-    put_event(head, NATIVE_EV_SCAN_START, 2, 0, 0, 0); /* the same scan: nothing new */
-    expect_frame(sh, SCANHEAD_EVENT, &f);
+    /* The same scan, which began at 500 ns: nothing new. Then one of a head that has started again. */
+    for (int is_other = 0; is_other < 2; is_other++) {
+        put_event(head, NATIVE_EV_SCAN_START, 2, 500u + (uint64_t)is_other, 0, 0);
+        expect_frame(sh, SCANHEAD_EVENT, &f);
+        assert_int_equal(scanhead_get_info(sh, &info), is_other ? SCANHEAD_ESTATE : 0);
+    }
+    put_descriptor(head, 1, 2, 0);
+    put_anchor(head, 0);
+    put_event(head, NATIVE_EV_SCAN_START, 2, 77, 0,
+              0); /* no points came: a client that joins gets the descriptor first */
+    for (int i = 0; i < 3; i++)
+        assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);
     assert_int_equal(scanhead_get_info(sh, &info), 0);
     put_event(head, NATIVE_EV_SCAN_START, 3, 0, 0, 0);
     expect_frame(sh, SCANHEAD_EVENT, &f);

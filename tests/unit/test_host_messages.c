@@ -94,7 +94,7 @@ static void test_calls(void **state)
     struct scanhead_attribute attribute;
     struct scanhead_colour colour;
     struct scanhead_line_end end;
-    char source[100], want[200], reply[4], line[1026];
+    char source[100], want[200], reply[4], line[258];
     put_descriptor(head, 1, 1, 0);
     put_anchor(head, 0);
     put_points(head, 1, 0);
@@ -122,16 +122,18 @@ static void test_calls(void **state)
     snprintf(want, sizeof want, "%s only points of the polar layout can be converted to the scene frame", source);
     assert_string_equal(scanhead_error(sh), want);
 
-#define NO_COMMAND "not a command: one line of at most 1024 printable ASCII characters"
+#define NO_COMMAND "not a command: one line of 1 to 256 printable ASCII characters"
     static const char *const wrong[] = {"", "  ", "a\n", "a\x1f", "a\x7f"};
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
         assert_int_equal(scanhead_command(sh, wrong[i], reply, sizeof reply, 1), SCANHEAD_EINPUT);
         assert_string_equal(scanhead_error(sh), NO_COMMAND);
     }
-    memset(line, 'a', 1025);
-    line[1025] = '\0';
+    memset(line, 'a', 257); /* COMMANDS.md: a head takes 256 */
+    line[257] = '\0';
     assert_int_equal(scanhead_command(sh, line, reply, sizeof reply, 1), SCANHEAD_EINPUT);
     assert_string_equal(scanhead_error(sh), NO_COMMAND);
+    line[256] = '\0';
+    assert_int_equal(scanhead_command(sh, line, reply, sizeof reply, 1), SCANHEAD_ETIMEOUT); /* it was sent */
     close(head);
     scanhead_close(sh);
 }

@@ -300,6 +300,26 @@ static void nothing_starts_while_a_station_is_moved(void **state)
     rig_close(rig);
 }
 
+/* ACTIONS.md: a reboot moves no station, and a head that boots takes no place, also where its planning began before. */
+static void a_reboot_moves_no_station(void **state)
+{
+    (void)state;
+    struct command_result result;
+    struct rig *rig = rig_idle(NULL, NULL, 0);
+    expect_moved(rig, "SITE:POSE 1,2,0,0,0,0,0");
+    device_command(rig->device, 1, "SITE:POSE 1,3,0,0,0,0,0", rig->next, &result);
+    device_plan_move(rig->device);
+    assert_string_equal(rig_tell(rig, "HEAD:REBOOT", rig->next), "OK");
+    rig_go_to(rig, rig->next + 100);
+    device_finish_move(rig->device, rig->next, &result);
+    assert_non_null(strstr(result.reply, "SITE:POSE: the head is not idle any more"));
+    expect_refused(rig, "SITE:POSE 1, DEF", CMD_E_SETTINGS, "SITE:POSE is not possible in state boot");
+    rig_go_to(rig, rig->next + 300);
+    assert_string_equal(rig_tell(rig, "SITE:POSE? 1", rig->next), "2,0,0,0,0,0");
+    assert_string_not_equal(rig_tell(rig, "SITE:POSE? 1, DEF", rig->next), "2,0,0,0,0,0");
+    rig_close(rig);
+}
+
 static void the_end_of_the_run_ends_planning(void **state)
 {
     (void)state;
@@ -419,6 +439,7 @@ int main(void)
         cmocka_unit_test(who_asks_holds_the_site_of_a_scan),
         cmocka_unit_test(a_move_that_fails_changes_nothing),
         cmocka_unit_test(nothing_starts_while_a_station_is_moved),
+        cmocka_unit_test(a_reboot_moves_no_station),
         cmocka_unit_test(the_end_of_the_run_ends_planning),
         cmocka_unit_test(a_platforms_stations_stay),
         cmocka_unit_test(settings_hold_at_the_new_place),

@@ -38,6 +38,23 @@ static void begin(void)
     rig_points(0, 0, 100, &one, 1);
 }
 
+/* A head that started again gives its scan the number of the unfinished one. Its first descriptor is lost, and so are
+ * its first points: only SCAN_START says that the scan is another one. The event may also come late in the scan. */
+static void test_same_number_with_another_start(void **state)
+{
+    (void)state;
+    for (int is_other = 0; is_other < 2; is_other++) {
+        const struct native_event start = {.code = NATIVE_EV_SCAN_START, .a = 1, .b = is_other ? 5000 : 0};
+        begin();
+        rig_put(out, native_encode_event(out, sizeof out, &start, 200000000, 0));
+        put_descriptor_again(1);
+        put_anchor(1);
+        rig_scan_t0_ns = (int64_t)start.b;
+        rig_points(0, 0, 300, &one, 1);
+        expect_scans(1 + is_other);
+    }
+}
+
 /* The descriptor of the second scan is lost, but not its anchor: the points are of another station. */
 static void test_another_station(void **state)
 {
@@ -160,9 +177,13 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_another_station),       cmocka_unit_test(test_same_station),
-        cmocka_unit_test(test_same_number),           cmocka_unit_test(test_rows_of_another_scan),
-        cmocka_unit_test(test_poses_of_another_scan), cmocka_unit_test(test_anchor_of_another_stretch),
+        cmocka_unit_test(test_same_number_with_another_start),
+        cmocka_unit_test(test_another_station),
+        cmocka_unit_test(test_same_station),
+        cmocka_unit_test(test_same_number),
+        cmocka_unit_test(test_rows_of_another_scan),
+        cmocka_unit_test(test_poses_of_another_scan),
+        cmocka_unit_test(test_anchor_of_another_stretch),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }

@@ -95,6 +95,50 @@ static void test_end_lost(void **state)
     }
 }
 
+static enum recording_news points_at(struct recording_counts *c, uint32_t n_pulses, int64_t t_ns, int64_t t0_ns)
+{
+    const struct scanhead_frame frame = {
+        .type = SCANHEAD_POINTS, .n_pulses = n_pulses, .t_ns = t_ns, .scan_t0_ns = t0_ns};
+    return recording_count(c, &frame, 0);
+}
+
+static enum recording_news start_at(struct recording_counts *c, uint32_t scan, int64_t t_ns, int64_t b_ns)
+{
+    const struct scanhead_frame frame = {
+        .type = SCANHEAD_EVENT, .event = SCANHEAD_EV_SCAN_START, .event_value = {scan, (uint64_t)b_ns}, .t_ns = t_ns};
+    return recording_count(c, &frame, frames_lost);
+}
+
+/* LOSSES.md: a head that started again gives its scan the number of the unfinished one. The new scan has another start,
+ * or time goes back. The event of the scan at hand may come after its first points. */
+static void test_the_same_number_again(void **state)
+{
+    static const struct {
+        int64_t t_ns, b_ns;
+        enum recording_news news;
+    } row[] = {{900, 500, RECORDING_NOTHING},
+               {600, 500, RECORDING_NOTHING},
+               {900, 800, RECORDING_END_LOST},
+               {900, 200, RECORDING_END_LOST},
+               {510, 500, RECORDING_END_LOST}};
+    (void)state;
+    for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
+        const int is_other = row[i].news == RECORDING_END_LOST;
+        struct recording_counts c = {0};
+        assert_int_equal(start_at(&c, 3, 500, 500), RECORDING_NOTHING);
+        descriptor(&c, 3);
+        points_at(&c, 100, 600, 100);
+        assert_int_equal(start_at(&c, 3, row[i].t_ns, row[i].b_ns), row[i].news);
+        descriptor(&c, 3);
+        points_at(&c, 40, row[i].b_ns + 700, 700);
+        assert_int_equal(telemetry(&c, HEAD_SPIN_DOWN, 3, 60, 50, 0), RECORDING_NOTHING);
+        assert_int_equal(event(&c, SCANHEAD_EV_SCAN_END, 3, 60, 0), RECORDING_SCAN_OVER);
+        assert_true(c.scans == 1u + (unsigned)is_other && c.pulses == 140 && c.fired == 60);
+        /* The final counts of the first scan never came: what came of it is the least. */
+        if (is_other) assert_true(c.cast == 150 && c.missing == 10 && c.unknown == 1);
+    }
+}
+
 /* Without the end of a scan its pulses are those that came, that the head lost and that it left out. */
 static void test_counts_without_an_end(void **state)
 {
@@ -202,6 +246,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test_setup(test_left_out, set_up),
                                        cmocka_unit_test_setup(test_end_lost, set_up),
+                                       cmocka_unit_test_setup(test_the_same_number_again, set_up),
                                        cmocka_unit_test_setup(test_counts_without_an_end, set_up),
                                        cmocka_unit_test_setup(test_final_counts, set_up),
                                        cmocka_unit_test_setup(test_final_counts_without_an_end, set_up),

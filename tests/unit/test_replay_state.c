@@ -238,6 +238,9 @@ static void a_command_is_seen_at_once(void **state)
     for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
         assert_string_equal(said(r, rows[i].line), "OK");
         assert_string_equal(said(r, "HEAD:STATE?"), rows[i].before);
+        const int plays = strcmp(rows[i].before, "spin-up") == 0;
+        assert_memory_equal(said(r, "SCAN:REPL?"), plays ? "PLAYING," : "IDLE,", plays ? 8 : 5);
+        if (!plays) assert_string_equal(said(r, rows[i].line), "OK"); /* once more is no error */
         assert_int_equal(replay_source.next(r, rows[i].tick, 0, 0, &tick), LOOP_SOURCE_TICK);
         assert_string_equal(said(r, "HEAD:STATE?"), rows[i].after);
     }

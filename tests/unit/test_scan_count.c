@@ -9,27 +9,30 @@
 #include "drivers/protocol/native_encode.h"
 #include "drivers/record/scan_count.h"
 
-enum { DESCRIPTOR, REPEATED, POINTS, EVENT };
+enum { DESCRIPTOR, REPEATED, POINTS, EVENT, START };
 
 struct step {
     int what;
     uint32_t scan;
     int64_t t_ns;
-    uint64_t n; /* of scans, with this frame */
+    uint64_t n; /* of scans, with this frame. t_ns of POINTS and START: their scan's start */
 };
 
 static void take(struct scan_count *count, const struct step *s)
 {
     static uint8_t frame[1024] = {[1] = NATIVE_POINTS};
     const struct native_descriptor d = {.scan = s->scan, .frames = 1};
-    const struct native_event e = {0};
+    const struct native_event e = {0}, start = {.code = NATIVE_EV_SCAN_START, .a = s->scan, .b = (uint64_t)s->t_ns};
+    const struct line_block block = {.t0_ns = 700};
     if (s->what == DESCRIPTOR || s->what == REPEATED)
         assert_true(
             native_encode_descriptor(frame, sizeof frame, &d, s->t_ns, s->what == REPEATED ? NATIVE_REPEAT : 0) > 0);
     else if (s->what == EVENT)
         assert_true(native_encode_event(frame, sizeof frame, &e, s->t_ns, 0) > 0);
+    else if (s->what == START)
+        assert_true(native_encode_event(frame, sizeof frame, &start, s->t_ns + 900, 0) > 0);
     else
-        frame[1] = NATIVE_POINTS;
+        assert_true(native_encode_points(frame, sizeof frame, &block, s->t_ns) > 0);
     scan_count_frame(count, frame);
 }
 
@@ -61,12 +64,17 @@ static void test_frames(void **state)
                                         {POINTS, 0, 0, 1},
                                         {DESCRIPTOR, 1, 9, 1},
                                         {DESCRIPTOR, 1, 8, 2}},
+                             number[] = {{START, 3, 100, 0},       {DESCRIPTOR, 3, 101, 1}, {POINTS, 0, 100, 1},
+                                         {START, 3, 100, 1},       {POINTS, 0, 100, 1},     {START, 3, 5000, 2},
+                                         {DESCRIPTOR, 3, 6000, 2}, {POINTS, 0, 5000, 2},    {START, 4, 9000, 2},
+                                         {DESCRIPTOR, 4, 9900, 3}},
                              idle[] = {{REPEATED, 7, 1, 0}, {REPEATED, 8, 1, 0}, {DESCRIPTOR, 8, 2, 1}};
 #define TELL(steps) tell(steps, (int)(sizeof(steps) / sizeof *(steps)))
     TELL(plain);
     TELL(joined); /* its descriptor was lost, and a repeated one names it */
     TELL(lost);   /* the first descriptor of scan 2 was lost */
     TELL(again);  /* the head was started again: its time begins anew */
+    TELL(number); /* a SCAN_START of the same number, late for the scan at hand, then with another start */
     TELL(idle);   /* repeated ones between scans */
 }
 

@@ -75,6 +75,8 @@ static void a_scan_of_its_own_may_be_over_when_it_comes(void **state)
     assert_string_equal(rig.line[1], "SCAN:START");
     protocol_rig_input(&rig, "MD0000108001000\n");
     rig.ops->time(rig.protocol, 100000000);
+    rig.identity.spin_up_ns = 1900000000; /* and the mirror is slow */
+    rig.ops->time(rig.protocol, 1900000000);
     scip_turn(4);
     rig.ops->time(rig.protocol, 9000000000);
     for (uint32_t i = 2; i < rig.n_lines; i++)

@@ -252,6 +252,12 @@ def ends(path):
     assert ends_of(path, start, scanning, idle, idle) == ([2], 0)
     for other in following:
         assert ends_of(path, start, scanning, other, scanning) == ([2, 3] if other == following[0] else [2], 0)
+    geo = struct.pack("<128xI128xI8x", 1, 1)  # layout geo, which needs no scales; scan 1
+    points = struct.pack("<IIQqqII", 0, 0, 0, 50, 0, 0, 0)  # at the frame's time 0: the scan began at -50 ns
+    scan = framed(scanhead.DESCRIPTOR, 0, 272, geo), start, framed(scanhead.POINTS, 0, 40, points)
+    late, again = (event(scanhead.EV_SCAN_START, 1, t0_ns % 2**64) for t0_ns in (-50, 60))
+    assert ends_of(path, *scan, late, scanning, stop) == ([5], 7)
+    assert ends_of(path, *scan, again, scanning, stop) == ([3, 5], 7)  # the head has started again
     print("ends")
 
 

@@ -322,6 +322,45 @@ static void test_restart(void **state)
     assert_non_null(strstr(last, "Points that nobody can place yet"));
 }
 
+/* After the first points come the scan's own SCAN_START once more, or late, and then points; or one with another start.
+ * PROTOCOL.md: the anchor is void then. */
+static void expect_after_start(int is_other)
+{
+    static const char *const fields[] = {"_ws.expert.message", NULL};
+    struct capture c = {0};
+    size_t len;
+    uint32_t seq = 0;
+    uint8_t *bytes = (uint8_t *)wire_read(wire_path(wire, "polar.shs"), &len), *start = NULL, *at = bytes;
+    capture_begin(&c);
+    const uint32_t interface = capture_interface(&c, CAPTURE_USER0);
+    for (int more = 2; more > 0; at += native_frame_len(at)) {
+        assert_true(at < bytes + len);
+        if (at[1] == NATIVE_EVENT && le_get32(at + NATIVE_HEADER_LEN) == NATIVE_EV_SCAN_START) start = at;
+        if (at[1] == NATIVE_POINTS && --more == 0) {
+            assert_non_null(start);
+            start[NATIVE_HEADER_LEN + 18] ^= (uint8_t)is_other; /* 65536 ns earlier or later */
+            le_put32(start + 8, seq++);
+            seal_frame(start);
+            capture_packet(&c, interface, start, native_frame_len(start));
+        }
+        le_put32(at + 8, seq++);
+        seal_frame(at);
+        capture_packet(&c, interface, at, native_frame_len(at));
+    }
+    wire_write(wire, "start.pcapng", c.bytes, c.len);
+    free(c.bytes);
+    free(bytes);
+    dissect("start.pcapng", 1, fields);
+    assert_int_equal(strstr(dissected_text(), "Points that nobody can place yet") != NULL, is_other);
+}
+
+static void test_the_same_number_again(void **state)
+{
+    (void)state;
+    expect_after_start(0);
+    expect_after_start(1);
+}
+
 /* The telemetry before the end of a scan has its final counts. If that one is missing, an earlier one does not stand
  * for it: here it is made one from within the scan, before 7 of the pulses. */
 static void test_counts_that_are_not_final(void **state)
@@ -356,7 +395,7 @@ static void test_counts_that_are_not_final(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(test_hurt), cmocka_unit_test(test_damage),
-                                       cmocka_unit_test(test_restart),
+                                       cmocka_unit_test(test_restart), cmocka_unit_test(test_the_same_number_again),
                                        cmocka_unit_test(test_counts_that_are_not_final)};
     return cmocka_run_group_tests(tests, wireshark_setup, wire_teardown);
 }

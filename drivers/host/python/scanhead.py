@@ -1430,9 +1430,10 @@ class Head:
                POINTS: self._absorb_points, EVENT: self._absorb_event, SURFACES: self._absorb_surfaces,
                POSES: self._poses.absorb, ATTRIBUTES: self._absorb_attributes, COLOURS: self._absorb_colours,
                WAVES: self._absorb_waves, EMITTER: self._absorb_emitter}.get(frame.type)
+        is_again = frame.is_event(EV_SCAN_START) and self._is_same_number_again(frame)
         if act is not None:
             act(frame)
-        self._follow_scan(frame)
+        self._follow_scan(frame, is_again)
         return frame
 
     def _follow_sequence(self, frame: Frame) -> None:
@@ -1451,11 +1452,12 @@ class Head:
             self._gps = self._scan_t0_ns = None
         self._last_seq, self._last_repeated, self._told_alone = frame.seq, repeated, False
 
-    def _follow_scan(self, frame: Frame) -> None:
-        """Sets scan_over. SCAN_END may be lost: so the next frame that reports another scan, or none, ends it, too."""
+    def _follow_scan(self, frame: Frame, is_again: bool) -> None:
+        """Sets scan_over. is_again: a scan of the same number begins. SCAN_END may be lost: so the next frame that
+        reports another scan, or none, ends it, too."""
         f, now = frame.fields, self._scan
         if frame.is_event(EV_SCAN_START):
-            now = f["a"]
+            now = None if is_again else f["a"]
         elif frame.type == DESCRIPTOR:
             now = f["scan"]
         elif frame.type == TELEMETRY:
@@ -1466,9 +1468,17 @@ class Head:
         if self.scan_over:
             self._scan = None
         if frame.is_event(EV_SCAN_START):
-            self._scan = now
+            self._scan = f["a"]
         elif frame.type == POINTS and self.descriptor is not None:
             self._scan = self.descriptor["scan"]
+
+    def _is_same_number_again(self, start: Frame) -> bool:
+        """Whether a SCAN_START with the descriptor's number is of another scan, which has another start: the head has
+        started again. The event of the scan at hand can come after its first points, where the head lost the tick with
+        it."""
+        f = start.fields
+        return (self.descriptor is not None and f["a"] == self.descriptor["scan"] and
+                self._last_pulse0 is not None and (f["b"] - self._scan_t0_ns) % 2**64 != 0)
 
     def _forget(self) -> None:
         self.descriptor = self.anchor = self.emitter = self._last_pulse0 = None
@@ -1548,7 +1558,7 @@ class Head:
         elif code == EV_SCAN_END:
             self._lost_ended += c
         elif code == EV_SCAN_START:
-            if self.descriptor is not None and a != self.descriptor["scan"]:
+            if self.descriptor is not None and a != self.descriptor["scan"] or self._is_same_number_again(frame):
                 self._forget()
             self._scan_t0_ns, self._gps = b, (b, c) if c else None
         elif code == EV_TIME:

@@ -15,6 +15,7 @@ export class Losses {
   #unexplained = 0; // missing frames that no READER_LOST had explained at the last telemetry
   #scan = null;
   #isRunning = false;
+  #t0_s = null; // start of the scan whose points came; null: none came
   #shots = 0; // pulses received before the scan
   #before = {scan: null, shots: 0}; // the pulses of a scan that past() brought
   #counts = null; // the last telemetry
@@ -45,7 +46,9 @@ export class Losses {
   }
 
   points(batch) {
-    this.#isRunning ||= batch.scan === this.#scan;
+    if (batch.scan !== this.#scan) return;
+    this.#isRunning = true;
+    this.#t0_s = batch.began_s;
   }
 
   /** Takes points that the head had kept. In a scan that this page joined late they then don't count as missing. */
@@ -76,6 +79,7 @@ export class Losses {
   event(e) {
     switch (e.name) {
       case 'SCAN_START':
+        if (this.#isAgain(e)) this.#restart(e);
         this.#begin(e.scan, e.shots);
         this.#isRunning = true;
         break;
@@ -103,7 +107,21 @@ export class Losses {
     if (this.#scan === scan) return;
     this.#end(this.#scan, null, shots);
     this.#scan = scan;
+    this.#t0_s = null;
     this.#shots = scan === this.#before.scan ? shots - this.#before.shots : shots;
+  }
+
+  // Whether a SCAN_START is of another scan with the number of the scan at hand, which has another start: the head has
+  // started again. The event of the scan at hand can come after its first points. Starts of points are rounded by less
+  // than a microsecond.
+  #isAgain(e) {
+    if (!this.#isRunning || this.#scan !== e.scan || this.#t0_s === null) return false;
+    return Math.abs(Number(e.at_ns) * 1e-9 - this.#t0_s) > 1e-6;
+  }
+
+  #restart({shots}) {
+    this.#end(this.#scan, this.#final(this.#scan), shots);
+    this.#scan = this.#counts = this.#due = null;
   }
 
   // The telemetry directly before SCAN_END, of state spin-down, has the final counts.

@@ -39,6 +39,7 @@ export class Decoder {
     this.waves = new Waves();
     this.columns = new Columns(ROOM);
     this.lastPulse0 = -1;
+    this.scanT0_ns = 0n; // with lastPulse0: device time of the scan's pulse 0
     this.shots = 0;
     this.batch = null; // what the points in the columns have in common
     this.last = null; // the last points frame, until its attributes and colours have come
@@ -153,8 +154,19 @@ export class Decoder {
     this.on.emitter?.(e);
   }
 
+  // A SCAN_START with the descriptor's number is of another scan if that scan has another start: the head has started
+  // again. The event of the scan at hand can come after its first points, where the head lost the tick with it.
+  #isOfOther(start) {
+    if (this.descriptor === null) return false;
+    const hasOther = this.lastPulse0 >= 0 && BigInt.asIntN(64, start.at_ns) !== this.scanT0_ns;
+    return start.scan !== this.descriptor.scan || hasOther;
+  }
+
   #event(e) {
-    if (e.name === 'SCAN_START' && this.descriptor !== null && e.scan !== this.descriptor.scan) this.#forget();
+    if (e.name === 'SCAN_START' && this.#isOfOther(e)) {
+      if (e.scan === this.descriptor.scan) this.waves.clear(); // its pulses may have the numbers of earlier ones
+      this.#forget();
+    }
     this.on.event?.(e);
   }
 
@@ -179,6 +191,7 @@ export class Decoder {
     const until_ms = this.anchor?.until_ms ?? 0;
     if (until_ms !== 0 && t0_ns >= until_ms * 1e6) this.anchor = null; // the next one did not come
     this.lastPulse0 = pulse0;
+    this.scanT0_ns = frame.t_ns - BigInt(t0_ns);
     this.hash.add(view, n, low, high);
     this.stats.shots += shots;
     this.stats.points += n;

@@ -616,7 +616,7 @@ local ABSORB = {
     local n_pulses, n = unpack_bytes("<I4I4", bytes, at + 33)
     if flow.last_pulse0 and pulse0 < flow.last_pulse0 then forget(flow) end
     if flow.anchor and flow.anchor.until_ns ~= 0 and t0_ns >= flow.anchor.until_ns then flow.anchor = nil end
-    flow.last_pulse0 = pulse0
+    flow.last_pulse0, flow.scan_t0_ns = pulse0, signed64(h.raw, 15) - t0_ns
     flow.points = {seq = h.seq, packet = m.packet, key = pulse0 .. "/" .. line .. "/" .. n,
                    waves = pulse0 .. "/" .. line .. "/" .. time_in(h)}
     local begun = 0
@@ -648,7 +648,11 @@ local ABSORB = {
     local code, a = number_at(bytes, at), number64(bytes, at + 8)
     local b, c = number64(bytes, at + 16), number64(bytes, at + 24)
     if code == 2 then
-      if flow.descriptor and flow.descriptor.scan ~= a then forget(flow) end
+      -- A scan of the same number with another start is another scan: the head has started again. Times that a number
+      -- of Lua can't hold exactly are rounded by less than 1000 ns.
+      local is_other = flow.last_pulse0 and math.abs(flow.scan_t0_ns - signed64(bytes, at + 16)) > 1000
+      if flow.descriptor and (flow.descriptor.scan ~= a or is_other) then forget(flow) end
+      if is_other then flow.final = nil end
       begin_scan(flow, a)
     elseif code == 3 and flow.final and flow.final.scan == a then
       local f = flow.final

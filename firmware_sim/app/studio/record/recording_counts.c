@@ -79,8 +79,20 @@ static enum recording_news enter(struct recording_counts *c, uint32_t number)
     return end_lost ? RECORDING_END_LOST : RECORDING_NOTHING;
 }
 
-static enum recording_news recording_counts_begin(struct recording_counts *c, uint32_t number)
+/* Whether a SCAN_START begins another scan of the same number: that scan has another start, or time has gone back. The
+ * event of the scan at hand can come after its first points, where the head lost the tick with it. */
+static int is_same_number_again(const struct recording_counts *c, const struct scanhead_frame *frame)
 {
+    const int64_t t0_ns = (int64_t)frame->event_value[1];
+    if (!c->within || c->scan.number != (uint32_t)frame->event_value[0]) return 0;
+    return t0_ns != c->scan.t0_ns || frame->t_ns < c->scan.last_ns;
+}
+
+static enum recording_news recording_counts_begin(struct recording_counts *c, const struct scanhead_frame *frame)
+{
+    const uint32_t number = (uint32_t)frame->event_value[0];
+    const int is_again = is_same_number_again(c, frame);
+    if (is_again) recording_count_end(c);
     enum recording_news news = enter(c, number);
     if (!c->within) {
         memset(&c->scan, 0, sizeof c->scan); /* overruns of the scan before may have come after its end */
@@ -91,7 +103,7 @@ static enum recording_news recording_counts_begin(struct recording_counts *c, ui
     /* An earlier scan of this number was one of another head, or from before this head started again. */
     if (c->told.scan == number) c->told.scan = 0;
     if (c->due.scan == number) c->due.scan = 0;
-    return news;
+    return is_again ? RECORDING_END_LOST : news;
 }
 
 static enum recording_news take_telemetry(struct recording_counts *c, const struct scanhead_frame *frame,
@@ -134,7 +146,7 @@ static enum recording_news recording_counts_take_event(struct recording_counts *
 {
     switch (frame->event) {
     case SCANHEAD_EV_SCAN_START:
-        return recording_counts_begin(c, (uint32_t)frame->event_value[0]);
+        return recording_counts_begin(c, frame);
     case SCANHEAD_EV_SCAN_END:
         return take_scan_end(c, frame, frames_lost);
     case SCANHEAD_EV_OVERRUN:
@@ -158,6 +170,8 @@ enum recording_news recording_count(struct recording_counts *c, const struct sca
         c->within = 1;
         c->pulses += frame->n_pulses;
         c->scan.pulses += frame->n_pulses;
+        c->scan.t0_ns = (int64_t)((uint64_t)frame->t_ns - (uint64_t)frame->scan_t0_ns); /* a broken stream may wrap */
+        c->scan.last_ns = frame->t_ns;
         return RECORDING_NOTHING;
     case SCANHEAD_DESCRIPTOR:
         if (native_decode_descriptor(frame->payload, frame->payload_len, &descriptor) != 0) return RECORDING_NOTHING;

@@ -2,7 +2,8 @@
 /* The pulses of a recording: what came, and what the head says of the rest. COUNTS.md defines the words.
  *
  * In: each frame of the stream. Out: sums over the scans whose end is known: by SCAN_END or, where that was lost, by
- * telemetry of the idle head, by a frame of another scan, or by recording_count_end.
+ * telemetry of the idle head, by a frame of another scan, or by recording_count_end. A head that started again gives
+ * its scans the numbers of earlier ones: LOSSES.md says how such scans are told apart.
  *
  * The final counts of a scan come with a telemetry of any state but scanning. The last one before SCAN_END has them. If
  * that one was lost, the scan counts with what is known at least, and the next telemetry corrects the sums. */
@@ -26,6 +27,7 @@ struct recording_counts {
     struct {
         uint32_t number;                 /* 0: not known */
         int is_seen_begin;               /* its SCAN_START came */
+        int64_t t0_ns, last_ns;          /* device time of its pulse 0, and of its last points frame */
         uint64_t pulses, left_out, lost; /* since it began, or the recording did; lost: as OVERRUN says */
     } scan;
     struct {
