@@ -38,8 +38,8 @@ void bvh_free(struct bvh *bvh);
  * hits are the same. */
 void bvh_set_packet(struct bvh *bvh, uint32_t rays);
 /* This machine's engine, in words: Embree's version, rays a packet, instructions. On machines with the same words, the
- * same rays hit the same triangles. */
-void bvh_engine(char *text, size_t len);
+ * same rays hit the same triangles. SH_ENOMEM and SH_EIO as bvh_create has them; text is then empty. */
+int bvh_engine(char *text, size_t len, struct sh_err *err);
 void bvh_get_info(const struct bvh *bvh, struct bvh_info *info);
 /* The origin of the local frame: the middle of the scene, or where most triangles of a large scene without copies
  * are. */

@@ -4,6 +4,8 @@
 #include <stdarg.h>
 #include <stdio.h>
 
+#include "core/utf8.h"
+
 /* Some terminals take U+0080 to U+009F for commands, too. In UTF-8 these are 0xc2 and one more byte. */
 static int is_high_control(const char *c)
 {
@@ -12,11 +14,15 @@ static int is_high_control(const char *c)
 
 void sh_keep_line(char *text)
 {
-    for (char *c = text; *c != '\0'; c++)
+    int len;
+    for (char *c = text; *c != '\0'; c += len) {
+        len = utf8_len(c, 4);
         if (is_high_control(c))
             c[0] = c[1] = '?';
-        else if ((unsigned char)*c < ' ' || *c == 0x7f)
+        else if (len == 0 || (unsigned char)*c < ' ' || *c == 0x7f)
             *c = '?';
+        if (len == 0) len = 1;
+    }
 }
 
 int sh_fail(struct sh_err *err, int code, const char *fmt, ...)

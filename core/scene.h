@@ -224,9 +224,9 @@ int scene_find_same(const struct scene *scene, const struct sh_report *report, u
 void scene_free(struct scene *scene);
 
 /* Finds a file that a mesh or its library names. The file is searched by its name in n <= 4 folders, then by the name's
- * last part there; then both without regard to case. Folders are paths up to their last slash, and may be empty. To be
- * freed; NULL: it is nowhere. */
-char *scene_find_file(const char *const *folder, size_t n, const char *name);
+ * last part there; then, with any_case, both without regard to case, which reads the folders. Folders are paths up to
+ * their last slash, and may be empty. To be freed; NULL: it is nowhere. */
+char *scene_find_file(const char *const *folder, size_t n, const char *name, int any_case);
 
 /* Reads the image of a texture, as texture_read does. */
 int scene_read_texture(const struct scene_texture *texture, int alpha_only, struct texture_image *image,

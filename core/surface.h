@@ -52,6 +52,7 @@ struct surface_table {
     struct surface *surface;          /* [n + 1] */
     struct surface_texture **texture; /* [n + 1], an entry is NULL without texture; NULL: no surface has one */
     uint8_t *by_vertex;               /* [n + 1] 1: colours of vertices count; NULL: nowhere */
+    struct surface_found *found;      /* inner state: which labels have which texture */
 };
 
 int surface_table_alloc(uint32_t n, struct surface_table *table, struct sh_err *err);
@@ -93,6 +94,7 @@ struct surface_colours {
     uint32_t *own;                /* [n] without a texel */
     struct surface_image **image; /* [n] NULL where there is none */
     uint8_t *by_vertex;           /* [n] 1: some of its triangles have colours at their corners */
+    struct surface_found *found;  /* inner state: which labels have which image */
 };
 int surface_colours_alloc(uint32_t n, struct surface_colours *colours, struct sh_err *err);
 /* Leaves no entries. The function may be called again, and after an alloc that failed. */

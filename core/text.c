@@ -254,22 +254,3 @@ bool text_number(struct text *t, double *value)
     t->p = end;
     return true;
 }
-
-int text_utf8_len(const char *p, size_t n)
-{
-    const unsigned char c = n > 0 ? (unsigned char)p[0] : 0xff;
-    const size_t len = c < 0x80                ? 1
-                       : c >= 0xc2 && c < 0xe0 ? 2
-                       : c >= 0xe0 && c < 0xf0 ? 3
-                       : c >= 0xf0 && c < 0xf5 ? 4
-                                               : 0;
-    /* The second byte may have narrower limits. Below them are codes with a shorter form, above them surrogates and
-     * codes beyond U+10FFFF. */
-    const unsigned char low = c == 0xe0 ? 0xa0 : c == 0xf0 ? 0x90 : 0x80;
-    const unsigned char high = c == 0xed ? 0x9f : c == 0xf4 ? 0x8f : 0xbf;
-    for (size_t i = 1; i < len; i++) {
-        const unsigned char next = i < n ? (unsigned char)p[i] : 0;
-        if (next < (i == 1 ? low : 0x80) || next > (i == 1 ? high : 0xbf)) return 0;
-    }
-    return (int)len;
-}

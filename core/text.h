@@ -75,10 +75,6 @@ static inline int text_hex_digit(char c)
                                   : -1;
 }
 
-/* Length of the character in UTF-8 that begins at p, within n bytes; 0: none does (Unicode 15, table 3-7). Reading
- * ends at the first byte that is no part of the character, so n may be 4 where a NUL ends the text. */
-int text_utf8_len(const char *p, size_t n);
-
 /* Skips blanks, and line ends that a backslash hides. */
 void text_skip_blanks(struct text *t);
 

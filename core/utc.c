@@ -82,7 +82,7 @@ int utc_table_parse(const char *text, struct utc_table *out, struct sh_err *err)
 int utc_table_add(struct utc_table *table, int64_t posix_s)
 {
     uint32_t i = table->n;
-    if (table->n == UTC_MAX_LEAPS) return 0;
+    if (table->n == UTC_MAX_LEAPS || posix_s < table->leap[0].posix_s) return 0;
     while (i > 1 && table->leap[i - 1].posix_s > posix_s)
         i--;
     if (table->leap[i - 1].posix_s == posix_s) return 0;

@@ -47,8 +47,8 @@ const struct utc_table *utc_table_builtin(void);
 /* The text of a leap-seconds.list (IERS, NIST, tzdata): NTP seconds and TAI-UTC, `#@` the expiry. On failure
  * out is unspecified. The error names the line, unless only the whole table is wrong: no entry, or no later expiry. */
 int utc_table_parse(const char *text, struct utc_table *out, struct sh_err *err);
-/* Adds a leap second before this POSIX second, which need not be a full minute. 0: there is one already, or the table
- * is full. */
+/* Adds a leap second before this POSIX second, which need not be a full minute. 0: there is one already, the table is
+ * full, or the second is before the first entry (1972), where UTC has no whole leap seconds. */
 int utc_table_add(struct utc_table *table, int64_t posix_s);
 
 void utc_from_tai(const struct utc_table *table, int64_t tai_ns, struct utc_time *out);

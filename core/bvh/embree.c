@@ -45,11 +45,14 @@ static const char *instructions(void)
 #endif
 }
 
-void bvh_engine(char *text, size_t len)
+int bvh_engine(char *text, size_t len, struct sh_err *err)
 {
+    text[0] = '\0';
     RTCDevice device = rtcNewDevice("tessellation_cache_size=1,threads=1");
+    if (device == NULL) return embree_fail(rtcGetDeviceError(NULL), err);
     const int version = (int)rtcGetDeviceProperty(device, RTC_DEVICE_PROPERTY_VERSION);
     snprintf(text, len, "Embree %d.%d.%d, packets of %u, %s", version / 10000, version / 100 % 100, version % 100,
              embree_packet(device), instructions());
     rtcReleaseDevice(device);
+    return SH_OK;
 }

@@ -12,6 +12,7 @@
 #include "core/grow.h"
 #include "core/rng.h"
 #include "core/scene/find_file.h"
+#include "core/utf8.h"
 
 static int compare_surfaces(const void *a, const void *b)
 {
@@ -39,9 +40,7 @@ int scene_copy_name(char *out, size_t room, const char *name, size_t n)
         return 0;
     }
     const size_t tail_len = (size_t)snprintf(tail, sizeof tail, "~%016" PRIx64, number_of(name, n));
-    len = room - 1 - tail_len;
-    while (len > 0 && ((unsigned char)name[len] & 0xc0) == 0x80)
-        len--; /* not within a character of UTF-8 */
+    len = utf8_cut(name, room - 1 - tail_len);
     memcpy(out, name, len);
     memcpy(out + len, tail, tail_len + 1);
     return 1;

@@ -91,19 +91,24 @@ static struct text_span last_part(struct text_span name)
     return (struct text_span){name.p + at, name.n - at};
 }
 
-char *build_find_file(const struct text_span *folder, size_t n, struct text_span name)
+static char *search(const struct text_span *folder, size_t n, struct text_span name, int any_case)
 {
     char *path = NULL;
-    for (int way = 0; way < 4 && path == NULL; way++)
+    for (int way = 0; way < (any_case ? 4 : 2) && path == NULL; way++)
         for (size_t i = 0; i < n && path == NULL; i++)
             path = find_in(folder[i], way % 2 == 0 ? name : last_part(name), way >= 2);
     return path;
 }
 
-char *scene_find_file(const char *const *folder, size_t n, const char *name)
+char *build_find_file(const struct text_span *folder, size_t n, struct text_span name)
+{
+    return search(folder, n, name, 1);
+}
+
+char *scene_find_file(const char *const *folder, size_t n, const char *name, int any_case)
 {
     struct text_span in[4];
     for (size_t i = 0; i < n; i++)
         in[i] = (struct text_span){folder[i], strlen(folder[i])};
-    return build_find_file(in, n, (struct text_span){name, strlen(name)});
+    return search(in, n, (struct text_span){name, strlen(name)}, any_case);
 }

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 #include "core/scene.h"
-#include "core/text.h"
+#include "core/utf8.h"
 
 /* Where the next character begins. A byte that is no UTF-8 is a character by itself. */
 static const char *after_character(const char *p)
 {
-    const int n = text_utf8_len(p, 4);
+    const int n = utf8_len(p, 4);
     return p + (n > 0 ? n : 1);
 }
 

@@ -5,7 +5,9 @@
 #include <string.h>
 
 #include "core/colour.h"
+#include "core/rng.h"
 #include "core/surface.h"
+#include "core/surface/found.h"
 
 /* An image's rows go from the top down. Labels with the same image share it. */
 struct surface_image {
@@ -33,6 +35,7 @@ void surface_colours_free(struct surface_colours *colours)
     free(colours->image);
     free(colours->own);
     free(colours->by_vertex);
+    free(colours->found);
     *colours = (struct surface_colours){.n = 0};
 }
 
@@ -64,14 +67,28 @@ static int colours_load(const struct scene_texture *from, struct surface_image *
     return rc;
 }
 
+struct wanted {
+    const struct surface_colours *colours;
+    const struct scene_texture *from;
+};
+
+static int is_wanted(const void *ctx, uint32_t label)
+{
+    const struct wanted *w = ctx;
+    return w->colours->image[label]->from == w->from;
+}
+
 int surface_colours_texture(struct surface_colours *colours, uint32_t label, const struct scene_texture *texture,
                             struct sh_err *err)
 {
-    struct surface_image *image = NULL;
-    for (uint32_t i = 0; i < colours->n && image == NULL; i++)
-        if (colours->image[i] != NULL && colours->image[i]->from == texture) image = colours->image[i];
+    const struct wanted wanted = {colours, texture};
+    const uint64_t hash = rng_mix((uint64_t)(uintptr_t)texture);
+    uint32_t *slot = surface_found_slot(&colours->found, colours->n, hash, is_wanted, &wanted);
+    if (slot == NULL) return sh_fail(err, SH_ENOMEM, "no memory for textures");
+    struct surface_image *image = *slot != 0 ? colours->image[*slot - 1] : NULL;
     int rc = image == NULL ? colours_load(texture, &image, err) : SH_OK;
     if (rc != SH_OK) return rc;
+    if (*slot == 0) *slot = label + 1;
     image->users++;
     colours->image[label] = image;
     return SH_OK;

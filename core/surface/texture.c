@@ -6,6 +6,8 @@
 #include <string.h>
 
 #include "core/colour.h"
+#include "core/rng.h"
+#include "core/surface/found.h"
 
 /* An image as reflectances. Its rows go from the top down. A texel is 1 + 65534 times the reflectance, as it stands in
  * the high 16 bits of a hit's label (surface_texel). Labels with the same image and colour share one texture. */
@@ -25,8 +27,10 @@ void surface_textures_free(struct surface_table *table)
         if (table->texture[i] != NULL && --table->texture[i]->users == 0) free(table->texture[i]);
     free(table->texture);
     free(table->by_vertex);
+    free(table->found);
     table->texture = NULL;
     table->by_vertex = NULL;
+    table->found = NULL;
 }
 
 static uint16_t as_texel(double reflectance)
@@ -66,14 +70,28 @@ static int texture_load(const struct scene_texture *from, const float colour[CHA
     return rc;
 }
 
-static struct surface_texture *texture_find(const struct surface_table *table, const struct scene_texture *from,
-                                            const float colour[CHANNELS])
+struct wanted {
+    const struct surface_table *table;
+    const struct scene_texture *from;
+    const float *colour;
+};
+
+static int is_wanted(const void *ctx, uint32_t label)
 {
-    for (uint32_t i = 0; i < table->n; i++) {
-        struct surface_texture *t = table->texture[i];
-        if (t != NULL && t->from == from && memcmp(t->colour, colour, sizeof t->colour) == 0) return t;
+    const struct wanted *w = ctx;
+    const struct surface_texture *t = w->table->texture[label];
+    return t->from == w->from && memcmp(t->colour, w->colour, sizeof t->colour) == 0;
+}
+
+static uint64_t hash_of(const struct wanted *w)
+{
+    uint64_t hash = rng_mix((uint64_t)(uintptr_t)w->from);
+    for (int c = 0; c < CHANNELS; c++) {
+        uint32_t bits;
+        memcpy(&bits, &w->colour[c], sizeof bits);
+        hash = rng_mix(hash + bits);
     }
-    return NULL;
+    return hash;
 }
 
 int surface_table_texture(struct surface_table *table, uint32_t label, const struct scene_surface *named,
@@ -85,9 +103,13 @@ int surface_table_texture(struct surface_table *table, uint32_t label, const str
     if (s->glass > 0.0 || s->mirror > 0.0) return SH_OK;
     if (table->texture == NULL) table->texture = calloc((size_t)table->n + 1, sizeof *table->texture);
     if (table->texture == NULL) return sh_fail(err, SH_ENOMEM, "no memory for textures");
-    struct surface_texture *t = texture_find(table, texture, colour);
+    const struct wanted wanted = {table, texture, colour};
+    uint32_t *slot = surface_found_slot(&table->found, table->n, hash_of(&wanted), is_wanted, &wanted);
+    if (slot == NULL) return sh_fail(err, SH_ENOMEM, "no memory for textures");
+    struct surface_texture *t = *slot != 0 ? table->texture[*slot - 1] : NULL;
     int rc = t == NULL ? texture_load(texture, colour, &t, err) : SH_OK;
     if (rc != SH_OK) return rc;
+    if (*slot == 0) *slot = label + 1;
     t->users++;
     table->texture[label] = t;
     return SH_OK;

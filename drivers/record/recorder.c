@@ -79,6 +79,11 @@ int recorder_frame(struct recorder *rec, struct scanhead *sh, const struct scanh
     return rc;
 }
 
+void recorder_set_failed(struct recorder *rec)
+{
+    rec->has_failed = 1;
+}
+
 int recorder_save(struct recorder *rec, struct sh_err *err)
 {
     const int rc = rec->ops->save != NULL ? rec->ops->save(rec, err) : outfile_save(&rec->file, err);

@@ -126,6 +126,8 @@ void recorder_set_limits(struct recorder *rec, double low, double high);
 /* Takes each frame of the stream, in order, with the handle for information, points and surfaces. The handle must
  * live until close. Whole scans may come from different handles: heads in one scene, whose labels mean the same. */
 int recorder_frame(struct recorder *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);
+/* Some of the stream did not come, or will not: the file is not completed at its close, as after a failed write. */
+void recorder_set_failed(struct recorder *rec);
 /* To be called about once a second: writes what waits in memory to the disk. */
 int recorder_save(struct recorder *rec, struct sh_err *err);
 /* Finishes the file, syncs and renames it; keep = 0: throws it away. rec is freed, also after a failure. After a

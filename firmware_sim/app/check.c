@@ -276,7 +276,7 @@ static const struct app_option OPTIONS[] = {
     {APP_FLAG, "scene", NULL, .at = offsetof(struct check_run, scene),
      .help = "print the 50 largest objects of the scene, with triangles, open edges, area, volume and colour; the sum "
              "of all objects; the names of open objects"},
-    {APP_TEXT, "scene-csv", "FILE", .at = offsetof(struct check_run, csv), .file = APP_WRITES,
+    {APP_TEXT, "scene-csv", "FILE", .at = offsetof(struct check_run, csv), .file = APP_FILLS,
      .help = "write all objects, with IFC type and GlobalId, as CSV; - is standard output, and all other output goes "
              "to standard error then"},
     {APP_TEXT, "scenario", "FILE", .at = offsetof(struct check_run, in.scenario), .file = APP_READS,

@@ -36,8 +36,10 @@ enum app_option_kind {
     APP_PRINT      /* calls apply, which prints what was asked for: as with --help, the command does nothing else */
 };
 
-/* How the command uses the file that an option or an operand names. Pipes, devices and - count as no file. */
-enum app_use { APP_NO_FILE, APP_READS, APP_WRITES };
+/* How the command uses the file that an option or an operand names. Pipes, devices and - count as no file. APP_FILLS:
+ * it is written in place, maybe at the end of long work (newfile_open); so app_check_files tries before the work
+ * whether it can be opened. APP_WRITES: it is replaced by another one. */
+enum app_use { APP_NO_FILE, APP_READS, APP_WRITES, APP_FILLS };
 
 /* A row begins with kind, name and argument; the rest goes by name. */
 struct app_option {

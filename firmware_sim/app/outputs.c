@@ -2,11 +2,13 @@
 /* Checks the files that a command names: it writes none twice, and none that it reads, so that none is destroyed.
  * This file also checks that a file that an option or a link writes has a folder. */
 #include <errno.h>
+#include <fcntl.h>
 #include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "core/grow.h"
 #include "core/newfile.h"
@@ -22,6 +24,7 @@ struct named {
     struct stat st;  /* where it is there */
     int needs_place; /* its folder must be there already */
     int is_given;    /* by an option that writes it */
+    int is_filled;   /* likewise, and in place */
     int is_sidecar;  /* it is written beside another file: meshes of one scan share their image */
     size_t n_ending; /* where each scan gets a file of its own: bytes of the path's ending; 0: it is one file */
 };
@@ -107,10 +110,12 @@ static int add_option(struct files *f, const struct app_file *file)
     const char *added = file->added != NULL ? file->added : "";
     char *path = file->ending != NULL ? join(file->path, stem, file->ending, "") : join(file->path, len, added, "");
     const size_t n_ending = file->ending != NULL ? strlen(file->ending) : file->n_ending + strlen(added);
-    const int rc = outputs_add(f, who, path, file->use == APP_WRITES, file->each ? n_ending : 0);
+    const int is_written = file->use == APP_WRITES || file->use == APP_FILLS;
+    const int rc = outputs_add(f, who, path, is_written, file->each ? n_ending : 0);
     if (rc != SH_OK) return rc;
     f->file[f->n - 1].is_sidecar = file->ending != NULL || file->added != NULL;
-    f->file[f->n - 1].needs_place = f->file[f->n - 1].is_given = file->is_given && file->use == APP_WRITES;
+    f->file[f->n - 1].needs_place = f->file[f->n - 1].is_given = file->is_given && is_written;
+    f->file[f->n - 1].is_filled = file->is_given && file->use == APP_FILLS;
     return SH_OK;
 }
 
@@ -194,16 +199,55 @@ static int add_all(struct files *f, const struct app_input *in, const struct con
 
 /* ---- the check */
 
-/* A link is not followed when the file is made (core/newfile.h), except for the system's own, such as /dev/stdout. A
- * FIFO is not checked: its reader may come later, and one that waits would take the check for the end of the data. */
+static int is_of_system(const char *path)
+{
+    return strncmp(path, "/dev/", 5) == 0 || strncmp(path, "/proc/", 6) == 0;
+}
+
+/* A link is not followed when the file is made (core/newfile.h), except for the system's own, such as /dev/stdout. */
 static int check_link(const struct named *file, struct sh_err *err)
 {
     struct stat st;
     struct sh_err why;
-    const int is_of_system = strncmp(file->path, "/dev/", 5) == 0 || strncmp(file->path, "/proc/", 6) == 0;
-    if (is_of_system || lstat(file->path, &st) != 0 || !S_ISLNK(st.st_mode)) return SH_OK;
+    if (is_of_system(file->path) || lstat(file->path, &st) != 0 || !S_ISLNK(st.st_mode)) return SH_OK;
     newfile_fail_link(file->path, &why);
     return sh_fail(err, why.code, "%s %s", file->who, why.text);
+}
+
+static int fail_file(const struct named *file, int code, const char *why, struct sh_err *err)
+{
+    return sh_fail(err, code, "%s %s: %s", file->who, file->path, why);
+}
+
+/* Checks whether a new file can be made in its folder. */
+static int check_folder(const struct named *file, struct sh_err *err)
+{
+    struct stat st;
+    char folder[PATH_MAX];
+    const char *name = basename(file->path);
+    if (lstat(file->path, &st) != 0 && errno == ENAMETOOLONG)
+        return fail_file(file, SH_EINPUT, strerror(ENAMETOOLONG), err);
+    snprintf(folder, sizeof folder, "%.*s", (int)(name - file->path), file->path);
+    if (faccessat(AT_FDCWD, folder[0] != '\0' ? folder : ".", W_OK | X_OK, AT_EACCESS) == 0) return SH_OK;
+    return fail_file(file, SH_EPERM, strerror(errno), err);
+}
+
+/* Tries whether a file can be filled that is perhaps opened only at the end of long work. Nothing is changed. A FIFO is
+ * not opened: its reader may come later, and one that waits would take the check for the end of the data. */
+static int check_filled(const struct named *file, struct sh_err *err)
+{
+    struct sh_err why = {0};
+    int fd;
+    if (is_of_system(file->path) || strcmp(file->path, "-") == 0) return SH_OK;
+    if (!file->is_there) return check_folder(file, err);
+    if (S_ISSOCK(file->st.st_mode))
+        return fail_file(file, SH_EINPUT, "is a socket; allowed are a regular file, a device and a FIFO", err);
+    if (faccessat(AT_FDCWD, file->path, W_OK, AT_EACCESS) != 0) return fail_file(file, SH_EPERM, strerror(errno), err);
+    if (!S_ISREG(file->st.st_mode) || faccessat(AT_FDCWD, file->path, R_OK, AT_EACCESS) != 0) return SH_OK;
+    const int rc = newfile_append(file->path, &fd, &why);
+    if (rc == SH_OK) close(fd);
+    if (rc == SH_OK) return SH_OK;
+    return sh_fail(err, rc == SH_ESTATE ? SH_EINPUT : rc, "%s %s", file->who, why.text);
 }
 
 /* Some files are made at the end of long work. A missing folder shows now. */
@@ -247,6 +291,8 @@ int app_check_files(const struct app_input *in, const struct config *cfg, struct
     if (rc == SH_OK) rc = check(&f, err);
     for (size_t i = 0; i < f.n && rc == SH_OK; i++)
         if (f.file[i].is_given) rc = check_link(&f.file[i], err);
+    for (size_t i = 0; i < f.n && rc == SH_OK; i++)
+        if (f.file[i].is_filled) rc = check_filled(&f.file[i], err);
     for (size_t i = 0; i < f.n; i++) {
         free(f.file[i].who);
         free(f.file[i].path);

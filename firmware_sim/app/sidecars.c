@@ -54,14 +54,14 @@ static void decode(const char *name, char *out)
 
 /* Tries the name as it stands, then decoded. Either may be a path on another machine: then only its last part counts,
  * in upper or lower case. */
-static int sidecars_find(const struct search *s, const char *name, char path[PATH_MAX])
+static int sidecars_find(const struct search *s, const char *name, int any_case, char path[PATH_MAX])
 {
     const char *const folder[] = {s->here, s->folder};
     char decoded[NAME_MAX_LEN + 1];
     struct stat st;
     decode(name, decoded);
-    char *file = scene_find_file(folder, 2, name);
-    if (file == NULL) file = scene_find_file(folder, 2, decoded);
+    char *file = scene_find_file(folder, 2, name, any_case);
+    if (file == NULL) file = scene_find_file(folder, 2, decoded, any_case);
     const int is_found =
         file != NULL && stat(file, &st) == 0 && S_ISREG(st.st_mode) && snprintf(path, PATH_MAX, "%s", file) < PATH_MAX;
     free(file);
@@ -91,17 +91,19 @@ static int found(struct search *s, const char *name, const char *path, int depth
     return rc;
 }
 
-/* The name ends at `end`, and begins at `first` or after one of the blanks between both. */
+/* The name ends at `end`, and begins at `first` or after one of the blanks between both. To look for a name in another
+ * case, folders are read, which takes long in one with thousands of images; so the names as they stand come first. */
 static int try_names(struct search *s, const char *first, const char *end, int depth)
 {
     char name[NAME_MAX_LEN + 1], path[PATH_MAX];
     snprintf(name, sizeof name, "%.*s", (int)(end - first), first);
-    for (const char *p = name; p != NULL; p = strchr(p, ' ')) {
-        while (*p == ' ')
-            p++;
-        if (!sidecars_find(s, p, path)) continue;
-        return is_seen(s, path) ? SH_OK : found(s, p, path, depth);
-    }
+    for (int any_case = 0; any_case < 2; any_case++)
+        for (const char *p = name; p != NULL; p = strchr(p, ' ')) {
+            while (*p == ' ')
+                p++;
+            if (!sidecars_find(s, p, any_case, path)) continue;
+            return is_seen(s, path) ? SH_OK : found(s, p, path, depth);
+        }
     return SH_OK;
 }
 

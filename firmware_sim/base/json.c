@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/text.h"
+#include "core/utf8.h"
 
 void json_begin(struct json *json, FILE *out)
 {
@@ -25,7 +25,7 @@ static void put_string(FILE *out, const char *text)
 {
     fputc('"', out);
     for (const char *p = text; *p != '\0';) {
-        const int len = text_utf8_len(p, 4);
+        const int len = utf8_len(p, 4);
         if (len == 0)
             fputs("\\ufffd", out);
         else if (*p == '"' || *p == '\\')

@@ -9,6 +9,8 @@
 #include <string.h>
 #include <strings.h>
 
+#include "core/utf8.h"
+
 /* Not <ctype.h>: what a digit is must not depend on the locale. */
 static int is_digit(char c)
 {
@@ -199,5 +201,6 @@ void command_format_fixed(char *buf, size_t len, int64_t value, int decimals)
 void command_clip(char clip[COMMAND_CLIP_LEN], const char *text, size_t len)
 {
     const int whole = len < COMMAND_CLIP_LEN;
-    snprintf(clip, COMMAND_CLIP_LEN, "%.*s%s", whole ? (int)len : COMMAND_CLIP_LEN - 4, text, whole ? "" : "...");
+    const size_t n = whole ? len : utf8_cut(text, COMMAND_CLIP_LEN - 4);
+    snprintf(clip, COMMAND_CLIP_LEN, "%.*s%s", (int)n, text, whole ? "" : "...");
 }

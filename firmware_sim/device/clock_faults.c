@@ -20,7 +20,11 @@ static void add_leap(struct head_clock *clock, struct device_events *events, con
     utc_from_tai(&clock->table, utc_tai_from_posix(&clock->table, (posix_s - 1) * UTC_SECOND_NS), &utc);
     utc.second += added;
     utc_format(&utc, 0, text);
-    snprintf(said, sizeof said, added ? "leap second %s" : "no room for a leap second after %s", text);
+    snprintf(said, sizeof said,
+             added                                    ? "leap second %s"
+             : posix_s < clock->table.leap[0].posix_s ? "no leap second after %s: UTC has them from 1972 on"
+                                                      : "no room for a leap second after %s",
+             text);
     if (!added) device_push_error(events, 0, CMD_E_SETTINGS, said);
 }
 

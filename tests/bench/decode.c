@@ -71,7 +71,7 @@ static void print(uint32_t rounds, int raw)
                 printf("%s:%s_ns %.3f\n", WAY[way], LAYOUT[layout], ns[layout][way][i]);
     if (raw) return;
     char engine[128];
-    bvh_engine(engine, sizeof engine);
+    bvh_engine(engine, sizeof engine, NULL);
     printf("%s\n%-10s %9s %9s %9s   ns a point; recorded: columns without range and angles\n", engine, "", WAY[0],
            WAY[1], WAY[2]);
     for (int layout = 0; layout < LAYOUTS; layout++)

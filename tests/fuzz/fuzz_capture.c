@@ -143,6 +143,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     }
     const char *path = fuzz_file((how & 2) == 0 ? ".pcapng" : ".shs", bytes, in.n);
     replay(path);
-    answer(path, how >> 7);
+    answer(path, (int)(how >> 7));
     return 0;
 }

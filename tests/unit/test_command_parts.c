@@ -253,6 +253,15 @@ static void what_is_quoted_is_cut(void **state)
     assert_string_equal(clip, "abcdefghijklmnopqrstuvwxyz012345...");
     command_clip(clip, text, 0);
     assert_string_equal(clip, "");
+    /* It is cut between two characters: the euro sign, of three bytes, begins at 30, 31 or 32. */
+    static const char *const last[] = {"\xe2\x82\xac.....", ".\xe2\x82\xac....", "..\xe2\x82\xac..."};
+    for (int i = 0; i < 3; i++) {
+        char quoted[40], want[40];
+        snprintf(quoted, sizeof quoted, "%.30s%s", text, last[i]);
+        snprintf(want, sizeof want, "%.30s%.*s...", text, i, "..");
+        command_clip(clip, quoted, strlen(quoted));
+        assert_string_equal(clip, want);
+    }
 }
 
 /* ---- the head */

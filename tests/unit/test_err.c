@@ -25,12 +25,15 @@ static void errors_have_a_code_and_a_line(void **state)
     /* Control characters of ASCII, and of Latin-1 (two bytes in UTF-8), may be commands of a terminal. */
     static const char *const texts[][2] = {{"a\nb\r\x1f\x7f ~", "a?b??? ~"},
                                            {"\xc2\x80\xc2\x9f\xc2\xa0", "????\xc2\xa0"},
-                                           {"\xc3\x80\xc2", "\xc3\x80\xc2"},
-                                           {"\xc2\n", "\xc2?"}};
+                                           {"\xc3\x80\xc2", "\xc3\x80?"},
+                                           {"\xc2\n", "??"},
+                                           {"\xe4\xb8\xad \xe4\xb8.", "\xe4\xb8\xad ??."}};
     for (size_t i = 0; i < sizeof texts / sizeof texts[0]; i++) {
         sh_fail(&err, SH_EIO, "%s", texts[i][0]);
         assert_string_equal(err.text, texts[i][1]);
     }
+    sh_fail(&err, SH_EIO, "'%.5s'", "1234\xc3\xa9"); /* a quoted word is cut within its last character */
+    assert_string_equal(err.text, "'1234?'");
 }
 
 struct seen {

@@ -57,7 +57,7 @@ static int remove_files(void **state)
 static void expect(const char *const *folder, size_t n, const char *name, const char *want)
 {
     char path[128];
-    char *got = scene_find_file(folder, n, name);
+    char *got = scene_find_file(folder, n, name, 1);
     if (want != NULL) path_of(path, want);
     if (want == NULL ? got != NULL : got == NULL || strcmp(got, path) != 0)
         fail_msg("%s: %s instead of %s", name, got != NULL ? got : "nothing", want != NULL ? path : "nothing");
@@ -100,6 +100,19 @@ static void names_are_searched_in_order(void **state)
     expect(both, 0, "Wood.PNG", NULL);
 }
 
+/* Folders are read only where any case will do. */
+static void names_as_they_stand(void **state)
+{
+    (void)state;
+    const char *const both[2] = {first, second};
+    char path[128], *got = scene_find_file(both, 2, "elsewhere/wood.png", 0);
+    path_of(path, "b/wood.png");
+    assert_non_null(got);
+    assert_string_equal(got, path);
+    free(got);
+    assert_null(scene_find_file(both, 2, "WOOD.png", 0));
+}
+
 /* A whole path counts as it is, whatever the folders; a folder may be empty, which is the current one. */
 static void whole_paths(void **state)
 {
@@ -110,7 +123,7 @@ static void whole_paths(void **state)
     expect(one, 1, path, "a/Wood.PNG");
     assert_non_null(getcwd(before, sizeof before));
     assert_int_equal(chdir(first), 0);
-    char *got = scene_find_file(here, 1, "wood.png");
+    char *got = scene_find_file(here, 1, "wood.png", 1);
     assert_int_equal(chdir(before), 0);
     assert_non_null(got);
     assert_string_equal(got, "Wood.PNG");
@@ -119,6 +132,7 @@ static void whole_paths(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(names_are_searched_in_order), cmocka_unit_test(whole_paths)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(names_are_searched_in_order),
+                                       cmocka_unit_test(names_as_they_stand), cmocka_unit_test(whole_paths)};
     return cmocka_run_group_tests(tests, make_files, remove_files);
 }

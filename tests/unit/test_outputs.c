@@ -6,12 +6,16 @@
 #include <stdint.h>
 #include <cmocka.h>
 
+#include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/un.h>
 #include <unistd.h>
 
+#include "core/newfile.h"
 #include "firmware_sim/app/app.h"
 
 static char folder[] = "/tmp/scanhead-test-XXXXXX";
@@ -146,6 +150,55 @@ static void links(void **state)
     assert_int_equal(unlink("link"), 0);
 }
 
+/* Returns the result for a file that --stats names, and how it is used. */
+static int check_one(const char *path, enum app_use use)
+{
+    struct app_input in = {0};
+    const struct app_file file = {.option = "stats", .path = path, .use = use, .is_given = 1};
+    assert_int_equal(app_add_file(&in, &file), APP_OK);
+    err.text[0] = '\0';
+    return app_check_files(&in, NULL, &err);
+}
+
+/* A file that is filled may be opened only after hours. So it is tried at once, and nothing in it changes. A FIFO may
+ * still get its reader. */
+static void files_that_are_filled(void **state)
+{
+    (void)state;
+    static const char *const allowed[] = {"new", "old", "fifo", "-", "/dev/full", "/dev/stdout"};
+    struct sockaddr_un name = {.sun_family = AF_UNIX, .sun_path = "socket"};
+    char longest[NAME_MAX + 2];
+    int fd;
+    memset(longest, 'n', sizeof longest - 1);
+    longest[sizeof longest - 1] = '\0';
+    write_text("old", "text");
+    write_text("linked", "");
+    assert_int_equal(link("linked", "also"), 0);
+    assert_int_equal(mkfifo("fifo", 0600), 0);
+    const int socket_fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    assert_int_equal(bind(socket_fd, (const struct sockaddr *)&name, sizeof name), 0);
+    for (size_t i = 0; i < sizeof allowed / sizeof allowed[0]; i++)
+        if (check_one(allowed[i], APP_FILLS) != SH_OK) fail_msg("%s: %s", allowed[i], err.text);
+    struct stat st;
+    assert_true(stat("old", &st) == 0 && st.st_size == 4 && stat("new", &st) != 0);
+    assert_int_equal(check_one("linked", APP_WRITES), SH_OK); /* it is replaced, and the other name keeps its file */
+    assert_int_equal(check_one("linked", APP_FILLS), SH_EINPUT);
+    assert_string_equal(err.text, "--stats linked: is a file with 2 hard links, and all of them would change; remove "
+                                  "it first");
+    assert_int_equal(check_one("socket", APP_FILLS), SH_EINPUT);
+    assert_string_equal(err.text, "--stats socket: is a socket; allowed are a regular file, a device and a FIFO");
+    assert_int_equal(check_one(longest, APP_FILLS), SH_EINPUT);
+    assert_non_null(strstr(err.text, ": File name too long"));
+    assert_int_equal(newfile_open("old", &fd, &err), SH_OK); /* by another writer */
+    assert_int_equal(check_one("old", APP_FILLS), SH_EINPUT);
+    assert_non_null(strstr(err.text, "--stats old: is being written by "));
+    close(fd);
+    close(socket_fd);
+    static const char *const made[] = {"old", "linked", "also", "fifo", "socket"};
+    for (size_t i = 0; i < sizeof made / sizeof made[0]; i++)
+        assert_int_equal(unlink(made[i]), 0);
+}
+
 /* The files that a mesh names are read, too. */
 static void files_of_a_mesh(void **state)
 {
@@ -188,8 +241,9 @@ static void options_say_what_their_files_are(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(files_are_apart), cmocka_unit_test(files_beside_a_file),
-                                       cmocka_unit_test(links), cmocka_unit_test(files_of_a_mesh),
-                                       cmocka_unit_test(options_say_what_their_files_are)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(files_are_apart), cmocka_unit_test(files_beside_a_file),
+        cmocka_unit_test(links),           cmocka_unit_test(files_that_are_filled),
+        cmocka_unit_test(files_of_a_mesh), cmocka_unit_test(options_say_what_their_files_are)};
     return cmocka_run_group_tests(tests, go_there, come_back);
 }

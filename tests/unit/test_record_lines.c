@@ -47,6 +47,7 @@ static const struct lines_row POINTS[] = {
     {"--mesh, --sparse: a .ply can be only one of the two; allowed is --sparse with a mesh as .obj, .gltf, .glb or "
      ".fbx",
      {"record x.yaml -o a.ply --mesh --sparse 1"}},
+    {"--sparse 1e9: not a number from 1e-06 to 1000000", {"record x.yaml -o a.ply --sparse 1e9"}},
     {"--sparse-seed needs --sparse", {"record x.yaml -o a.ply --sparse-seed 0"}},
     {"--ply-columns: with --mesh and --sparse allowed are range, reflectance, label, station, frame, colour, xyz",
      {"record x.yaml -o a.ply --mesh --ply-columns time", "record x.yaml -o a.ply --sparse 1 --ply-columns echo",

@@ -1,213 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* The files of a recording: what each frame does to them, files of each scan, frames that wait for the limits of their
- * colours, remains of earlier recordings, and failures. Recorders and spools are the test's; each call is written to
- * `trace`. */
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
+/* The files of a recording: what each frame does to them, files of each scan, remains of earlier recordings, and
+ * failures. */
+#include "tests/unit/record_files_rig.h"
+
 #include <fcntl.h>
-#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
-#include <cmocka.h>
-
-#include "core/newfile.h"
-#include "core/studio/mesh.h"
-#include "drivers/record/outfile.h"
-#include "firmware_sim/app/app.h"
-#include "firmware_sim/app/studio/record/files.h"
-#include "tests/unit/trace_rig.h"
-
-static struct record_files files;
-static struct sh_err err;
-static char warned[256];
-static const char *left; /* the file that an earlier recording left */
-static int n_spools;
-static double lows[4], highs[4];
-
-static int is_repaired(struct repair *repair, struct sh_err *e)
-{
-    (void)repair;
-    (void)e;
-    return SH_OK;
-}
-
-static const struct recorder_ops OPS[] = {{.ending = ".ply", .track = {.wants_colours = 1}, .repair = is_repaired},
-                                          {.ending = ".shs", .repair = is_repaired},
-                                          {.ending = ".obj"},
-                                          {.ending = ".las", .repair = is_repaired},
-                                          {.ending = ".ptx", .repair = is_repaired}};
-
-const struct recorder_ops *recorder_find(const char *path, struct sh_err *e)
-{
-    for (size_t i = 0; i < sizeof OPS / sizeof OPS[0]; i++)
-        if (strcmp(strrchr(path, '.'), OPS[i].ending) == 0) return &OPS[i];
-    sh_fail(e, SH_EINPUT, "unknown");
-    return NULL;
-}
-
-const struct recorder_ops *recorder_shape(const struct recorder_ops *ops, const struct recorder_options *options)
-{
-    (void)options;
-    return ops;
-}
-
-int recorder_open(const struct recorder_ops *ops, const char *path, const struct recorder_options *options,
-                  struct recorder **rec, struct sh_err *e)
-{
-    for (int i = 0; i < files.n; i++)
-        if (files.file[i].now == path) *rec = (struct recorder *)&files.file[i];
-    if (options != &files.recorder || options->padding != &files.padding) say("OPTIONS ");
-    if (strstr(path, ops->ending) == NULL) say("OPS ");
-    const int rc = call(e, "open:%s", path);
-    if (rc != SH_OK) *rec = NULL;
-    return rc;
-}
-
-/* The place of a file in the list. */
-static int of(const struct recorder *rec)
-{
-    return (int)((const struct record_file *)(const void *)rec - files.file);
-}
-
-void recorder_set_limits(struct recorder *rec, double low, double high)
-{
-    say("limits%d:%g-%g ", of(rec), low, high);
-}
-
-int recorder_frame(struct recorder *rec, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *e)
-{
-    (void)sh;
-    return call(e, "%d<%u", of(rec), frame->seq);
-}
-
-int recorder_save(struct recorder *rec, struct sh_err *e)
-{
-    return call(e, "save%d", of(rec));
-}
-
-int recorder_close(struct recorder *rec, int keep, struct sh_err *e)
-{
-    return call(e, "%s%d", keep ? "keep" : "drop", of(rec));
-}
-
-int colour_spool_open(struct colour_spool *spool, const char *path, enum colour_mode mode, struct sh_err *e)
-{
-    if (mode != COLOUR_RANGE) say("MODE ");
-    spool->bytes = (uint64_t)n_spools++;
-    spool->low = lows[spool->bytes];
-    spool->high = highs[spool->bytes];
-    spool->has_points = spool->low < spool->high;
-    return call(e, "spool:%s", path);
-}
-
-int colour_spool_frame(struct colour_spool *spool, struct scanhead *sh, const struct scanhead_frame *frame,
-                       struct sh_err *e)
-{
-    (void)sh;
-    return call(e, "s%u<%u", (unsigned)spool->bytes, frame->seq);
-}
-
-int colour_spool_drain(struct colour_spool *spool,
-                       int (*fn)(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *e),
-                       void *ctx, const struct sh_report *report, struct sh_err *e)
-{
-    const struct scanhead_frame frame = {.seq = 90 + (uint32_t)spool->bytes};
-    if (report != files.recorder.report) say("REPORT ");
-    const int rc = call(e, "drain%u", (unsigned)spool->bytes);
-    return rc == SH_OK ? fn(ctx, NULL, &frame, e) : rc;
-}
-
-void colour_spool_close(struct colour_spool *spool)
-{
-    say("close_spool%u ", (unsigned)spool->bytes);
-}
-
-int outfile_check_left(const char *part, const char *path, struct sh_err *e)
-{
-    return call(e, "part:%s:%s", part, path);
-}
-
-/* Returns whether the path is a name of one scan: that of all scans with -NUMBER before its ending. */
-int app_is_name_of_scan(const char *of_all, size_t ending, const char *path)
-{
-    const size_t stem = strlen(of_all) - ending;
-    const size_t digits =
-        strncmp(path, of_all, stem) == 0 && path[stem] == '-' ? strspn(path + stem + 1, "0123456789") : 0;
-    return digits != 0 && strcmp(path + stem + 1 + digits, of_all + stem) == 0;
-}
-
-int mesh_is_float(const char *path)
-{
-    (void)path;
-    return 0;
-}
-
-long long newfile_left_len(const char *part)
-{
-    say("second:%s ", part);
-    return left != NULL && strcmp(part, left) == 0 ? 12 : 0;
-}
-
-static void warn(void *ctx, const char *text)
-{
-    (void)ctx;
-    snprintf(warned, sizeof warned, "%s", text);
-}
-
-static const struct sh_report REPORT = {.warn = warn};
-
-static int make(void **state)
-{
-    (void)state;
-    memset(&files, 0, sizeof files);
-    files.recorder.report = &REPORT;
-    files.recorder.colour.scale.mode = COLOUR_RANGE;
-    files.takes_over = 1;
-    trace[0] = warned[0] = '\0';
-    fails = fails_too = left = NULL;
-    n_spools = 0;
-    return 0;
-}
-
-static void add(const char *path)
-{
-    assert_int_equal(record_files_add(&files, path, &err), SH_OK);
-}
-
-static void expect(const char *expected)
-{
-    assert_string_equal(trace, expected);
-    trace[0] = '\0';
-}
-
-enum { HEAD_A = 1, HEAD_B = 2 };
-
-static int frame(int head, uint32_t seq, int type, uint32_t event, int flags)
-{
-    const struct scanhead_frame it = {.type = type, .seq = seq, .event = event, .flags = flags};
-    return record_files_frame(&files, (struct scanhead *)(trace + head), &it, &err);
-}
-
-static void points(int head, uint32_t seq)
-{
-    assert_int_equal(frame(head, seq, SCANHEAD_POINTS, 0, 0), SH_OK);
-}
-
-static void open_all(void)
-{
-    assert_int_equal(record_files_open(&files, &err), SH_OK);
-}
-
-static void close_all(int keep, int rc)
-{
-    assert_int_equal(record_files_close(&files, keep, &err), rc);
-    for (int i = 0; i < files.n; i++)
-        assert_true(files.file[i].now == NULL && files.file[i].rec == NULL);
-    assert_true(files.spool == NULL && files.n_spools == 0);
-}
 
 static void a_list_of_files(void **state)
 {
@@ -275,47 +73,6 @@ static void files_of_each_scan(void **state)
     expect("0<13 keep0 ");
 }
 
-/* Frames of files with colours wait for the limits: those of all heads' points. */
-static void frames_that_wait(void **state)
-{
-    (void)state;
-    add("a.ply");
-    add("b.shs");
-    files.own_limits = 1;
-    memcpy(lows, (const double[]){3, 0, 1}, sizeof(double[3]));
-    memcpy(highs, (const double[]){5, 0, 4}, sizeof(double[3])); /* the second head has no points */
-    open_all();
-    expect("open:a.ply open:b.shs spool:a.ply ");
-    points(HEAD_A, 1);
-    points(HEAD_B, 2);
-    points(HEAD_A, 3);
-    expect("s0<1 1<1 spool:a.ply s1<2 1<2 spool:a.ply s2<3 1<3 ");
-    close_all(1, SH_OK);
-    expect("limits0:1-5 limits1:1-5 drain0 0<90 drain1 0<91 drain2 0<92 keep0 keep1 close_spool0 close_spool1 "
-           "close_spool2 ");
-    make(NULL);
-    add("b.shs"); /* no file has colours */
-    files.own_limits = 1;
-    open_all();
-    points(HEAD_A, 1);
-    close_all(1, SH_OK);
-    expect("open:b.shs 0<1 keep0 ");
-    make(NULL);
-    add("a.ply");
-    files.own_limits = 1;
-    memset(lows, 0, sizeof lows);
-    memset(highs, 0, sizeof highs);
-    open_all();
-    close_all(1, SH_OK); /* without points there are no limits */
-    expect("open:a.ply spool:a.ply drain0 0<90 keep0 close_spool0 ");
-    make(NULL);
-    add("a.ply");
-    files.own_limits = 1;
-    open_all();
-    close_all(0, SH_OK);
-    expect("open:a.ply spool:a.ply drop0 close_spool0 ");
-}
-
 static void failures(void **state)
 {
     (void)state;
@@ -337,9 +94,9 @@ static void failures(void **state)
     assert_int_equal(files.has_points, 0);
     fails = "drain0"; /* a file without its colours is not kept */
     close_all(1, SH_EIO);
-    expect("s0<1 drain0 drop0 keep1 close_spool0 ");
+    expect("s0<1 drain0 failed0 drop0 keep1 close_spool0 ");
     assert_string_equal(err.text, "drain0 failed");
-    assert_string_equal(warned, "a.ply: its points could not be coloured; it is not written");
+    assert_string_equal(warned, "a.ply: its points could not be coloured; it is not written\n");
     make(NULL);
     add("a.ply");
     add("b.shs");
@@ -353,7 +110,7 @@ static void failures(void **state)
     close_all(1, SH_EIO);
     expect("open:a.ply open:b.shs save0 0<1 keep0 keep1 ");
     assert_string_equal(err.text, "keep0 failed"); /* the first one */
-    assert_string_equal(warned, "keep1 failed");
+    assert_string_equal(warned, "keep1 failed\n");
 }
 
 /* ---- remains of an earlier recording */
@@ -420,9 +177,11 @@ static void remains_of_scans(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(a_list_of_files, make),    cmocka_unit_test_setup(frames_go_to_all, make),
-        cmocka_unit_test_setup(files_of_each_scan, make), cmocka_unit_test_setup(frames_that_wait, make),
-        cmocka_unit_test_setup(failures, make),           cmocka_unit_test_setup(remains, make),
+        cmocka_unit_test_setup(a_list_of_files, make),
+        cmocka_unit_test_setup(frames_go_to_all, make),
+        cmocka_unit_test_setup(files_of_each_scan, make),
+        cmocka_unit_test_setup(failures, make),
+        cmocka_unit_test_setup(remains, make),
         cmocka_unit_test_setup(remains_of_scans, make),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -16,7 +16,9 @@
 #include "tests/unit/clock_rig.h"
 #include "tests/unit/lock_rig.h"
 
-#define MS INT64_C(1000000)
+#define MS           INT64_C(1000000)
+#define IDN          "a,b,c,scanhead native 1"
+#define IDN_OF_OTHER "a,b,d,scanhead native 1"
 
 /* The head's next answers, and the notes of faults that come while the first of them is awaited. */
 struct answer_is {
@@ -99,8 +101,8 @@ static void expect_counts(unsigned n, unsigned answered, unsigned timeouts, unsi
 
 static void three_questions_take_turns(void **unused)
 {
-    static const char *const questions[] = {"*IDN? ", "SYST:ERR:COUN? ", "SYST:VERS? "}, *const answers[] = {
-                                                                                             "a,b,c,d", "7", "1999.0"};
+    static const char *const questions[] = {"*IDN? ", "SYST:ERR:COUN? ", "SYST:VERS? "}, *const answers[] = {IDN, "7",
+                                                                                                             "1999.0"};
     (void)unused;
     begin(SCANHEAD_OK, "", 0);
     for (unsigned i = 0; i < 7; i++) {
@@ -109,19 +111,24 @@ static void three_questions_take_turns(void **unused)
         assert_string_equal(asked, questions[i % 3]);
         assert_string_equal(link.ask.before, answers[i % 3]);
         expect_counts(i + 1, i + 1, 0, 0, 0);
-        assert_string_equal(link.idn, "a,b,c,d");
+        assert_string_equal(link.idn, IDN);
     }
 }
 
-/* An identity has four parts, a count of errors one or two digits, and the version is that of SCPI. */
+/* An identity has four parts, of which the last names the stream. A count of errors has one or two digits, and the
+ * version is that of SCPI. */
 static void answers_are_right_or_wrong(void **unused)
 {
     static const struct {
         uint32_t question;
         const char *reply;
         unsigned right;
-    } rows[] = {{0, "Maker,Model,1,2.0", 1},
-                {0, ",,,", 1},
+    } rows[] = {{0, "Maker,Model,1,scanhead native 1", 1},
+                {0, ",,,scanhead native 2", 1},
+                {0, "1 drop, 2 burst, 3 late_reply, 4 echo", 0},
+                {0, "Maker,Model,1,scanhead native", 0},
+                {0, "Maker,Mo,del,1,scanhead native 1", 0},
+                {0, ",,,", 0},
                 {0, "Maker,Model,1", 0},
                 {0, "Maker,Model,1,2.0,", 0},
                 {0, "", 0},
@@ -221,7 +228,7 @@ static void replies_that_are_hurt(void **unused)
             assert_int_equal(link.ask.hurt, rows[i].hurt);
             assert_int_equal(link.ask.odd, 1 - rows[i].hurt);
         }
-    begin(SCANHEAD_OK, "a,b,c,d", 0); /* a right reply is not hurt by others */
+    begin(SCANHEAD_OK, IDN, 0); /* a right reply is not hurt by others */
     n_others = 1;
     ask();
     assert_true(link.ask.hurt == 0 && link.ask.odd == 0);
@@ -263,20 +270,20 @@ static void faults_of_replies(void **unused)
 {
     static const struct hit rows[] = {
         {FAULT_NO_REPLY, {SCANHEAD_ETIMEOUT, "", 0}, 1, NULL, 0, NULL},
-        {FAULT_NO_REPLY, {SCANHEAD_OK, "a,b,c,d", 900 * MS}, 1, NULL, 0, NULL},
-        {FAULT_NO_REPLY, {SCANHEAD_OK, "a,b,c,d", 899 * MS}, 0, NULL, 0, NULL},
-        {FAULT_NO_REPLY, {SCANHEAD_OK, "a,b,c,d", 899 * MS}, 0, SETTLES, 1, NULL},
+        {FAULT_NO_REPLY, {SCANHEAD_OK, IDN, 900 * MS}, 1, NULL, 0, NULL},
+        {FAULT_NO_REPLY, {SCANHEAD_OK, IDN, 899 * MS}, 0, NULL, 0, NULL},
+        {FAULT_NO_REPLY, {SCANHEAD_OK, IDN, 899 * MS}, 0, SETTLES, 1, NULL},
         {FAULT_NO_REPLY, {SCANHEAD_ECLOSED, "", 899 * MS}, 0, OVER, 1, NULL},
         {FAULT_LATE_REPLY, {SCANHEAD_ETIMEOUT, "", 0}, 1, NULL, 0, NULL},
-        {FAULT_LATE_REPLY, {SCANHEAD_OK, "a,b,c,d", 95 * MS}, 1, NULL, 0, NULL},
-        {FAULT_LATE_REPLY, {SCANHEAD_OK, "a,b,c,d", 94 * MS}, 0, NULL, 0, "a,b,c,d"},
+        {FAULT_LATE_REPLY, {SCANHEAD_OK, IDN, 95 * MS}, 1, NULL, 0, NULL},
+        {FAULT_LATE_REPLY, {SCANHEAD_OK, IDN, 94 * MS}, 0, NULL, 0, IDN},
         {FAULT_LATE_REPLY, {SCANHEAD_ELOST, "", 94 * MS}, 0, OVER, 0, NULL},
         {FAULT_WRONG_REPLY, {SCANHEAD_ETIMEOUT, "", 0}, 1, NULL, 0, NULL},
         {FAULT_WRONG_REPLY, {SCANHEAD_OK, "1999.0", 0}, 1, NULL, 0, NULL},
-        {FAULT_WRONG_REPLY, {SCANHEAD_OK, "a,b,c,d", 0}, 0, SAME, 0, "a,b,c,d"},
-        {FAULT_WRONG_REPLY, {SCANHEAD_OK, "a,b,c,d", 0}, 0, NULL, 0, "a,b,c,e"},
-        {FAULT_WRONG_REPLY, {SCANHEAD_OK, "a,b,c,d", 0}, 0, SETTLES, 1, "a,b,c,e"},
-        {FAULT_ECHO, {SCANHEAD_OK, "a,b,c,d", 0}, 0, NULL, 0, "a,b,c,d"},
+        {FAULT_WRONG_REPLY, {SCANHEAD_OK, IDN, 0}, 0, SAME, 0, IDN},
+        {FAULT_WRONG_REPLY, {SCANHEAD_OK, IDN, 0}, 0, NULL, 0, IDN_OF_OTHER},
+        {FAULT_WRONG_REPLY, {SCANHEAD_OK, IDN, 0}, 0, SETTLES, 1, IDN_OF_OTHER},
+        {FAULT_ECHO, {SCANHEAD_OK, IDN, 0}, 0, NULL, 0, IDN},
     };
     (void)unused;
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++)
@@ -293,7 +300,7 @@ static void echoes(void **unused)
     } rows[] = {{1, 0, 1}, {0, 6, 1}, {0, 7, 1}, {0, 5, 0}, {0, 0, 0}};
     (void)unused;
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
-        begin(SCANHEAD_OK, "a,b,c,d", 0);
+        begin(SCANHEAD_OK, IDN, 0);
         notes[0] = (struct fault_note){.kind = FAULT_ECHO, .n = 6};
         n_notes = 1;
         n_echoes = rows[i].echoes;
@@ -309,7 +316,7 @@ static void echoes(void **unused)
 static void several_faults_at_once(void **unused)
 {
     (void)unused;
-    begin(SCANHEAD_OK, "a,b,c,d", 500 * MS);
+    begin(SCANHEAD_OK, IDN, 500 * MS);
     for (n_notes = 0; n_notes < SOAK_MAX_REPLY_NOTES; n_notes++)
         notes[n_notes] = (struct fault_note){.kind = FAULT_LATE_REPLY, .for_ms = n_notes < 10 ? 100.0 : 600.0};
     notes[15].kind = FAULT_WRONG_REPLY;

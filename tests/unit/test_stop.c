@@ -6,6 +6,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 
+#include <dlfcn.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -23,6 +24,24 @@
 #include "tests/common/generate.h"
 
 enum { TRIANGLES = 4000, MANY = 200000 };
+
+static enum RTCError device_error; /* why Embree makes no device; RTC_ERROR_NONE: it makes one */
+
+RTCDevice rtcNewDevice(const char *config)
+{
+    RTCDevice (*real)(const char *config);
+    void *found = dlsym(RTLD_NEXT, "rtcNewDevice");
+    memcpy(&real, &found, sizeof real);
+    return device_error == RTC_ERROR_NONE ? real(config) : NULL;
+}
+
+enum RTCError rtcGetDeviceError(RTCDevice device)
+{
+    enum RTCError (*real)(RTCDevice device);
+    void *found = dlsym(RTLD_NEXT, "rtcGetDeviceError");
+    memcpy(&real, &found, sizeof real);
+    return device == NULL && device_error != RTC_ERROR_NONE ? device_error : real(device);
+}
 
 static struct scene *terrain, *large;
 static const double STATION_M[3] = {0, 0, 5};
@@ -164,6 +183,23 @@ static void errors_of_embree(void **state)
     assert_non_null(strstr(err.text, "RTCError 3"));
 }
 
+/* Embree may make no device, as without memory. Both functions that ask for one then have its error. */
+static void no_device(void **state)
+{
+    (void)state;
+    struct sh_err err;
+    struct bvh *bvh;
+    char engine[96];
+    device_error = RTC_ERROR_OUT_OF_MEMORY;
+    assert_int_equal(bvh_create(terrain, 1, NULL, &bvh, &err), SH_ENOMEM);
+    assert_int_equal(bvh_engine(engine, sizeof engine, &err), SH_ENOMEM);
+    assert_non_null(strstr(err.text, "bvh: no memory"));
+    assert_string_equal(engine, "");
+    device_error = RTC_ERROR_NONE;
+    assert_int_equal(bvh_engine(engine, sizeof engine, &err), SH_OK);
+    assert_int_equal(strncmp(engine, "Embree ", 7), 0);
+}
+
 /* The memory is enough for the leaves and for some of Embree's buffers (80 bytes a triangle), but not for its BVH. */
 static void no_memory_is_said(void **state)
 {
@@ -200,6 +236,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(errors_of_embree),
+        cmocka_unit_test(no_device),
         cmocka_unit_test(no_memory_is_said), /* forks: before Embree has threads here */
         cmocka_unit_test(work_is_ended),
     };

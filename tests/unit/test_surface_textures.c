@@ -77,6 +77,11 @@ static void reflectances_of_texels(void **state)
             assert_true(fabs(rho - 0.5 * want) < 1e-5);
             assert_int_equal(surface_texel(&table, i, beyond), i);
         }
+    /* Labels with the same image and colour share it; others don't. */
+    assert_ptr_equal(table.texture[0], table.texture[3]);
+    assert_ptr_equal(table.texture[2], table.texture[5]);
+    assert_true(table.texture[0] != table.texture[1] && table.texture[0] != table.texture[2] &&
+                table.texture[1] != table.texture[4] && table.texture[2] != table.texture[4]);
     /* A pane or a mirror stays as it is. */
     struct scene_surface plain = {.has_colour = 0};
     table.surface[0].glass = 0.5;
@@ -103,6 +108,8 @@ static void colours_of_texels(void **state)
         assert_int_equal(colours.by_vertex[i], i == 2);
         if (i != 3) assert_int_equal(surface_colours_texture(&colours, i, &texture[labels[i].image], &err), SH_OK);
     }
+    assert_true(colours.image[0] == colours.image[2] && colours.image[0] == colours.image[5]);
+    assert_true(colours.image[1] == colours.image[4] && colours.image[0] != colours.image[1]);
     for (uint32_t i = 0; i < LABELS; i++) {
         const uint8_t *of = texels[labels[i].image];
         const uint32_t own = labels[i].has_colour ? 0x8040bf : 0x808080; /* a half is 127.5, to even */

@@ -7,6 +7,7 @@
 
 #include "core/infile.h"
 #include "core/text.h"
+#include "core/utf8.h"
 #include "tests/unit/file_rig.h"
 #include "tests/common/cases.h"
 
@@ -259,11 +260,23 @@ static void characters_of_utf8(void **state)
               {"\xff", 0},
               {"\xe2\x82", 0}};
     for (size_t i = 0; i < sizeof is / sizeof is[0]; i++) {
-        if (text_utf8_len(is[i].bytes, 4) != is[i].len) fail_msg("case %zu", i);
+        if (utf8_len(is[i].bytes, 4) != is[i].len) fail_msg("case %zu", i);
         for (int n = 0; n < is[i].len; n++) /* a character that is cut */
-            assert_int_equal(text_utf8_len(is[i].bytes, (size_t)n), 0);
-        assert_int_equal(text_utf8_len(is[i].bytes, (size_t)is[i].len), is[i].len > 0 ? is[i].len : 0);
+            assert_int_equal(utf8_len(is[i].bytes, (size_t)n), 0);
+        assert_int_equal(utf8_len(is[i].bytes, (size_t)is[i].len), is[i].len > 0 ? is[i].len : 0);
     }
+}
+
+/* A text is cut before the character that n bytes would divide. Bytes that are no UTF-8 are cut at n. */
+static void a_text_is_cut_between_characters(void **state)
+{
+    (void)state;
+    static const char text[] = "a\xc3\xa9\xe2\x82\xac\xf0\x90\x80\x80"; /* characters of 1, 2, 3 and 4 bytes */
+    static const size_t cut[] = {0, 1, 1, 3, 3, 3, 6, 6, 6, 6, 10};
+    for (size_t n = 0; n < sizeof cut / sizeof cut[0]; n++)
+        assert_int_equal(utf8_cut(text, n), cut[n]);
+    assert_int_equal(utf8_cut("\x80\x80\x80\x80\x80\x80", 5), 5);
+    assert_int_equal(utf8_cut("\x80\x80", 1), 1);
 }
 
 /* The message has the last 120 bytes of a long path. */
@@ -344,6 +357,7 @@ int main(void)
         cmocka_unit_test(what_is_no_number),
         cmocka_unit_test(integers),
         cmocka_unit_test(characters_of_utf8),
+        cmocka_unit_test(a_text_is_cut_between_characters),
         cmocka_unit_test(messages_name_a_place),
         cmocka_unit_test(large_files),
         cmocka_unit_test(what_files_begin_with),

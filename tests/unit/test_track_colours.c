@@ -2,7 +2,10 @@
 /* Recordings with colours: as the head sends them, where points wait for them, and as computed from the points. */
 #include "tests/unit/recorder_rig.h"
 
+#include <fcntl.h>
+
 #include "core/colour.h"
+#include "firmware_sim/app/studio/record/colour_spool.h"
 
 enum { SHOTS = 10, ATTRIBUTES = NATIVE_HAS_ATTRIBUTES, COLOURS = NATIVE_HAS_COLOURS };
 
@@ -356,6 +359,61 @@ static void test_library(void **state)
     }
 }
 
+/* Stores the stream's frames, and keeps them as a file with this name. most: bytes that a file may have. */
+static int keep_frames(const char *path, rlim_t most, struct sh_err *err)
+{
+    struct colour_spool spool;
+    struct scanhead_frame frame;
+    struct scanhead *sh;
+    struct rlimit old;
+    void (*was)(int) = signal(SIGXFSZ, SIG_IGN);
+    assert_int_equal(scanhead_open(rig_shs, &sh, NULL, 0), 0);
+    assert_int_equal(colour_spool_open(&spool, rig_path("a.ply"), COLOUR_RANGE, err), SH_OK);
+    while (scanhead_next(sh, &frame, 0) == 0)
+        assert_int_equal(colour_spool_frame(&spool, sh, &frame, err), SH_OK);
+    getrlimit(RLIMIT_FSIZE, &old);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &(struct rlimit){most, old.rlim_max}), 0);
+    const int rc = colour_spool_keep(&spool, path, err);
+    setrlimit(RLIMIT_FSIZE, &old);
+    signal(SIGXFSZ, was);
+    colour_spool_close(&spool);
+    scanhead_close(sh);
+    return rc;
+}
+
+/* Frames that waited for the limits of colours can be kept as a .shs, in no other file's place. Where the disk is full,
+ * their beginning is kept as the part of one. */
+static void test_frames_kept(void **state)
+{
+    (void)state;
+    struct sh_err err = {0};
+    char path[160];
+    size_t len, kept;
+    snprintf(path, sizeof path, "%s", rig_path("a.ply.frames.shs"));
+    const int probe = open(rig_path(""), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
+    if (probe < 0) skip(); /* a file system that can't name such a file */
+    close(probe);
+    rig_begin();
+    put_head(1, 0, NULL);
+    put_points(0, 0, 0, 0);
+    fclose(rig_stream);
+    rig_stream = NULL;
+    uint8_t *stream = rig_read(rig_shs, &len);
+    if (keep_frames(path, RLIM_INFINITY, &err) != SH_OK) fail_msg("%s", err.text);
+    assert_int_equal(keep_frames(path, RLIM_INFINITY, &err), SH_ESTATE);
+    assert_non_null(strstr(err.text, "a.ply.frames.shs: cannot keep the frames: File exists"));
+    uint8_t *frames = rig_take("a.ply.frames.shs", &kept);
+    assert_int_equal(kept, len);
+    assert_memory_equal(frames, stream, len);
+    free(frames);
+    assert_int_equal(keep_frames(path, 100, &err), SH_EIO);
+    frames = rig_take("a.ply.frames.shs.part", &kept);
+    assert_int_equal(kept, 100);
+    assert_memory_equal(frames, stream, kept);
+    free(frames);
+    free(stream);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -363,7 +421,7 @@ int main(void)
         cmocka_unit_test(test_formats),          cmocka_unit_test(test_range),
         cmocka_unit_test(test_height),           cmocka_unit_test(test_frame),
         cmocka_unit_test(test_frames_of_points), cmocka_unit_test(test_kinds),
-        cmocka_unit_test(test_library),
+        cmocka_unit_test(test_library),          cmocka_unit_test(test_frames_kept),
     };
     return cmocka_run_group_tests_name("track_colours", tests, rig_set_up, rig_tear_down);
 }

@@ -77,6 +77,12 @@ static void room_for_leap_seconds(void **state)
         assert_int_equal(utc_table_add(&table, at), 0);
     }
     assert_int_equal(utc_table_add(&table, table.leap[table.n - 1].posix_s + 86400), 0);
+    /* Before 1972 there are none. */
+    table = *utc_table_builtin();
+    const struct utc_table same = table;
+    assert_int_equal(utc_table_add(&table, 0), 0);
+    assert_int_equal(utc_table_add(&table, table.leap[0].posix_s - 1), 0);
+    assert_memory_equal(&table, &same, sizeof table);
     /* A leap second in the middle moves the later ones on by a second. */
     table = *utc_table_builtin();
     const struct utc_table before = table;

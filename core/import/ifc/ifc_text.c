@@ -5,6 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/utf8.h"
+
 static int hex(const char *p, const char *end, int digits, uint32_t *value)
 {
     *value = 0;
@@ -84,7 +86,7 @@ char *ifc_text(struct text_span quoted)
     while (text != NULL && p < end) {
         const char *next = *p == '\\' ? escape(p, end, &out) : p;
         if (next == p) {
-            const int n = text_utf8_len(p, (size_t)(end - p)); /* some programs write Latin-1 */
+            const int n = utf8_len(p, (size_t)(end - p)); /* some programs write Latin-1 */
             if (n == 0) {
                 out = ifc_text_put(out, (unsigned char)*p);
             } else {

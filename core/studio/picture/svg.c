@@ -7,7 +7,7 @@
 #include <string.h>
 
 #include "core/studio/picture/inside.h"
-#include "core/text.h"
+#include "core/utf8.h"
 
 struct svg {
     FILE *out; /* into text */
@@ -40,7 +40,7 @@ static int character(const char *p)
 {
     const int is_control = (unsigned char)*p < 0x20 || *p == 0x7f;
     const int is_none = strncmp(p, "\xef\xbf\xbe", 3) == 0 || strncmp(p, "\xef\xbf\xbf", 3) == 0; /* U+FFFE, U+FFFF */
-    return is_control || is_none ? 0 : text_utf8_len(p, 4);
+    return is_control || is_none ? 0 : utf8_len(p, 4);
 }
 
 /* Bytes that are no character of XML, and control characters, become U+FFFD, the sign for that. */

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "core/utf8.h"
 #include "firmware_sim/base/nearest.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/load.h"
@@ -149,8 +150,7 @@ const char *cfg_show(const char *text, char *buf)
     size_t n = strnlen(text, CFG_SHOW_MAX - 4);
     memcpy(buf, text, n);
     if (text[n] != '\0') {
-        while (n > 0 && ((unsigned char)text[n] & 0xc0) == 0x80)
-            n--; /* not within a UTF-8 character */
+        n = utf8_cut(text, n);
         memcpy(buf + n, "...", 3);
         n += 3;
     }

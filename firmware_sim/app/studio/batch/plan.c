@@ -206,7 +206,7 @@ int batch_plan(struct batch *b)
     if (batch_sweeps_count(&b->sweeps, &b->n_combinations, &err) != SH_OK) return app_fail(&err);
     b->made = calloc(b->n_combinations, sizeof *b->made);
     if (b->made == NULL) return app_fail(&(struct sh_err){SH_ENOMEM, "no memory for the combinations"});
-    bvh_engine(b->engine, sizeof b->engine);
+    if (bvh_engine(b->engine, sizeof b->engine, &err) != SH_OK) return app_fail(&err);
     for (uint32_t i = 0; i < b->n_combinations; i++) {
         const int status = plan_combination(b, i);
         if (status != APP_OK) return status;

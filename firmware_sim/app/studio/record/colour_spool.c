@@ -2,9 +2,11 @@
 #include "firmware_sim/app/studio/record/colour_spool.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 enum { FRAMES_BETWEEN_STOPS = 256 };
@@ -34,8 +36,25 @@ static int fail_spool(const struct colour_spool *spool, struct sh_err *err)
     const int code = errno == EACCES || errno == EPERM || errno == EROFS ? SH_EPERM
                      : errno == ENOENT || errno == ENOTDIR               ? SH_EINPUT
                                                                          : SH_EIO;
-    return sh_fail(err, code, "%s: cannot keep the frames until the limits of the colours are known: %s", spool->path,
-                   strerror(errno));
+    return sh_fail(err, code, "%s: cannot keep the frames until the limits of the colours are known: %s",
+                   spool->track.path, strerror(errno));
+}
+
+/* Makes a file without a name in the folder of `path`: it vanishes with this process, even a killed one. A file of
+ * O_TMPFILE can get a name later, and a file that was unlinked can't; but not all file systems have O_TMPFILE. */
+static int open_nameless(const char *path)
+{
+    char *folder = strndup(path, (size_t)(basename(path) - path)), *name = NULL;
+    int fd = -1;
+    if (folder != NULL) fd = open(folder[0] != '\0' ? folder : ".", O_TMPFILE | O_RDWR | O_CLOEXEC, 0666);
+    free(folder);
+    if (fd >= 0 || asprintf(&name, "%s.frames-XXXXXX", path) < 0) return fd;
+    fd = mkostemp(name, O_CLOEXEC);
+    if (fd >= 0) unlink(name);
+    const int why = errno;
+    free(name);
+    errno = why;
+    return fd;
 }
 
 int colour_spool_open(struct colour_spool *spool, const char *path, enum colour_mode mode, struct sh_err *err)
@@ -46,13 +65,8 @@ int colour_spool_open(struct colour_spool *spool, const char *path, enum colour_
     spool->track.path = path;
     spool->track.ops = &ops;
     spool->track.rec = spool;
-    if (asprintf(&spool->path, "%s.frames-XXXXXX", path) < 0) {
-        spool->path = NULL;
-        return sh_fail(err, SH_ENOMEM, "%s: no memory to write it", path);
-    }
-    const int fd = mkstemp(spool->path);
+    const int fd = open_nameless(path);
     if (fd < 0) return fail_spool(spool, err);
-    unlink(spool->path); /* the file vanishes with this process, even a killed one */
     spool->file = fdopen(fd, "w+b");
     if (spool->file != NULL) return SH_OK;
     close(fd);
@@ -81,7 +95,7 @@ static int open_again(struct colour_spool *spool, struct sh_err *err)
     if (rc == SCANHEAD_OK) return SH_OK;
     close(fd);
     spool->sh = NULL;
-    return sh_fail(err, rc, "%s: %s", spool->path, why);
+    return sh_fail(err, rc, "%s: %s", spool->track.path, why);
 }
 
 int colour_spool_drain(struct colour_spool *spool,
@@ -109,10 +123,29 @@ int colour_spool_drain(struct colour_spool *spool,
     return rc;
 }
 
+int colour_spool_keep(struct colour_spool *spool, const char *path, struct sh_err *err)
+{
+    char own[32];
+    struct stat st;
+    if (spool->file == NULL || spool->bytes == 0) return sh_fail(err, SH_ESTATE, "%s: there are no frames", path);
+    const int fd = fileno(spool->file);
+    int rc = fflush(spool->file) == 0 ? SH_OK : SH_EIO; /* where the disk is full, the last frames are missing */
+    snprintf(own, sizeof own, "/proc/self/fd/%d", fd);
+    if (rc == SH_OK && (fstat(fd, &st) != 0 || (uint64_t)st.st_size != spool->bytes || fsync(fd) != 0)) rc = SH_EIO;
+    const char *end = rc == SH_OK ? "" : ".part";
+    char *name = NULL;
+    if (asprintf(&name, "%s%s", path, end) < 0) return sh_fail(err, SH_ENOMEM, "%s: no memory for its name", path);
+    if (linkat(AT_FDCWD, own, AT_FDCWD, name, AT_SYMLINK_FOLLOW) != 0)
+        rc = sh_fail(err, SH_ESTATE, "%s: cannot keep the frames: %s", name, strerror(errno));
+    else if (rc != SH_OK)
+        sh_fail(err, rc, "%s: the last frames could not be written", name);
+    free(name);
+    return rc;
+}
+
 void colour_spool_close(struct colour_spool *spool)
 {
     if (spool->sh != NULL) scanhead_close(spool->sh);
     if (spool->file != NULL) fclose(spool->file);
     track_free(&spool->track);
-    free(spool->path);
 }

@@ -15,7 +15,6 @@ struct colour_spool {
     /* inner state */
     enum colour_mode mode;
     FILE *file;
-    char *path; /* the name that the file had until it was unlinked; for messages */
     uint64_t bytes;
     int has_points;
     struct track track;
@@ -34,6 +33,10 @@ int colour_spool_drain(struct colour_spool *spool,
                        int (*fn)(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame,
                                  struct sh_err *err),
                        void *ctx, const struct sh_report *report, struct sh_err *err);
+/* After a failure: gives the file of the frames the name `path`, which ends in .shs and must be free. SH_EIO: the last
+ * frames are missing, and the file is `path`.part, as a recording that was killed. SH_ESTATE: there is no such file;
+ * the name is taken, or the file system can't name such a file. */
+int colour_spool_keep(struct colour_spool *spool, const char *path, struct sh_err *err);
 void colour_spool_close(struct colour_spool *spool);
 
 #endif

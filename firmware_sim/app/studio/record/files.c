@@ -255,18 +255,32 @@ int record_files_open(struct record_files *files, struct sh_err *err)
     return rc == SH_OK && files->own_limits && record_files_have_colours(files) ? add_spool(files, err) : rc;
 }
 
+/* Frames for files with colours, and the first error. A file that fails gets no more of them. */
+struct colouring {
+    struct record_files *files;
+    struct sh_err first;
+};
+
 static int to_coloured(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
 {
-    struct record_files *files = ctx;
-    int rc = SH_OK;
-    for (int i = 0; i < files->n && rc == SH_OK; i++)
-        if (files->file[i].ops->track.wants_colours) rc = recorder_frame(files->file[i].rec, sh, frame, err);
-    return rc;
+    struct colouring *c = ctx;
+    int n_left = 0;
+    for (int i = 0; i < c->files->n; i++) {
+        struct record_file *file = &c->files->file[i];
+        struct sh_err why = {0};
+        if (!file->ops->track.wants_colours || file->lacks) continue;
+        const int rc = recorder_frame(file->rec, sh, frame, &why);
+        file->lacks = rc != SH_OK;
+        n_left += rc == SH_OK;
+        if (rc != SH_OK && c->first.code == SH_OK) sh_fail(&c->first, rc, "%s", why.text);
+    }
+    return n_left > 0 ? SH_OK : sh_fail(err, c->first.code, "%s", c->first.text);
 }
 
 /* Gives the frames that waited to the files with colours. The limits of the colours are taken over all spools. */
 static int colour_files(struct record_files *files, struct sh_err *err)
 {
+    struct colouring c = {.files = files};
     double low = INFINITY, high = -INFINITY;
     int rc = SH_OK;
     for (uint32_t i = 0; i < files->n_spools; i++) {
@@ -277,26 +291,70 @@ static int colour_files(struct record_files *files, struct sh_err *err)
     for (int i = 0; i < files->n; i++)
         if (files->file[i].rec != NULL && low <= high) recorder_set_limits(files->file[i].rec, low, high);
     for (uint32_t i = 0; i < files->n_spools && rc == SH_OK; i++)
-        rc = colour_spool_drain(files->spool[i], to_coloured, files, files->recorder.report, err);
+        rc = colour_spool_drain(files->spool[i], to_coloured, &c, files->recorder.report, err);
+    for (int i = 0; i < files->n && rc != SH_OK; i++)
+        files->file[i].lacks = files->file[i].ops->track.wants_colours;
+    return rc == SH_OK && c.first.code != SH_OK ? sh_fail(err, c.first.code, "%s", c.first.text) : rc;
+}
+
+/* Returns whether the frames of one spool have a name now. */
+static int keep_spool(const struct record_files *files, uint32_t i)
+{
+    const struct sh_report *report = files->recorder.report;
+    struct sh_err why = {0};
+    char number[16] = "", *path = NULL;
+    if (i > 0) snprintf(number, sizeof number, "-%u", i + 1);
+    if (asprintf(&path, "%s.frames%s.shs", files->file[0].now, number) < 0) return 0;
+    const int rc = colour_spool_keep(files->spool[i], path, &why);
+    if (rc == SH_OK)
+        sh_warn(report, "%s keeps all frames of the points; scanhead record %s -o FILE makes files of them", path,
+                path);
+    else
+        sh_warn(report, "%s", why.text);
+    if (rc == SH_EIO) outfile_say_left(path, report);
+    free(path);
+    return rc == SH_OK || rc == SH_EIO;
+}
+
+/* Keeps the frames, which needs no room: they are on the disk already. Returns whether all have a name now. */
+static int keep_spools(const struct record_files *files)
+{
+    int all = 1;
+    for (uint32_t i = 0; i < files->n_spools; i++)
+        all &= keep_spool(files, i);
+    return all;
+}
+
+/* Closes one file. drops: where it lacks points that could not be coloured, it is removed. Else the points that reached
+ * the disk stay, as after a failed write. */
+static int close_file(const struct record_files *files, struct record_file *file, int keep, int drops,
+                      struct sh_err *err)
+{
+    if (file->rec == NULL) return SH_OK;
+    if (keep && file->lacks) {
+        sh_warn(files->recorder.report, "%s: its points could not be coloured; it is not written", file->now);
+        recorder_set_failed(file->rec);
+    }
+    const int rc = recorder_close(file->rec, keep && !(file->lacks && drops), err);
+    file->rec = NULL;
+    file->lacks = 0;
     return rc;
 }
 
 int record_files_close(struct record_files *files, int keep, struct sh_err *err)
 {
-    int rc = files->n_spools > 0 && keep ? colour_files(files, err) : SH_OK;
-    const int is_coloured = rc == SH_OK;
+    const int coloured = files->n_spools > 0 && keep ? colour_files(files, err) : SH_OK;
+    /* A campaign (takes_over) makes its files anew, and leaves nothing. */
+    const int drops = coloured == SH_ESTOPPED || (coloured != SH_OK && (files->takes_over || keep_spools(files)));
+    int rc = coloured, is_cut = 0; /* a file with colours could not be completed */
     for (int i = 0; i < files->n; i++) {
         struct sh_err why = {0};
-        if (files->file[i].rec == NULL) continue;
-        const int is_whole = is_coloured || !files->file[i].ops->track.wants_colours;
-        if (!is_whole)
-            sh_warn(files->recorder.report, "%s: its points could not be coloured; it is not written",
-                    files->file[i].now);
-        int e = recorder_close(files->file[i].rec, keep && is_whole, &why);
-        files->file[i].rec = NULL;
-        if (e != SH_OK && rc != SH_OK) sh_warn(files->recorder.report, "%s", why.text); /* err has the first */
-        if (e != SH_OK && rc == SH_OK) rc = sh_fail(err, e, "%s", why.text);
+        const int e = close_file(files, &files->file[i], keep, drops, &why);
+        is_cut |= e != SH_OK && e != SH_ESTOPPED && files->file[i].ops->track.wants_colours;
+        if (e != SH_OK && rc != SH_OK && why.text[0] != '\0') sh_warn(files->recorder.report, "%s", why.text);
+        if (e != SH_OK && rc == SH_OK) rc = sh_fail(err, e, "%s", why.text); /* err has the first */
     }
+    if (coloured == SH_OK && is_cut && keep && !files->takes_over) keep_spools(files);
     close_spools(files);
     for (int i = 0; i < files->n; i++) {
         free(files->file[i].now);

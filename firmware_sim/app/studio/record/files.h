@@ -26,6 +26,7 @@ struct record_files {
         char *now; /* the path of the present file: with --split it has the scan's number */
         const struct recorder_ops *ops;
         struct recorder *rec;
+        int lacks; /* some of the frames that waited could not be given to it */
     } file[RECORD_MAX_FILES];
     int n;
     unsigned part;               /* number of the scan in split files, from 1 */
@@ -66,7 +67,9 @@ int record_files_open(struct record_files *files, struct sh_err *err);
 int record_files_save(struct record_files *files, struct sh_err *err);
 int record_files_frame(struct record_files *files, struct scanhead *sh, const struct scanhead_frame *frame,
                        struct sh_err *err);
-/* Closes all, also after a failure; keep 0: removes the files. Returns the first error, if any; err may be NULL. */
+/* Closes all, also after a failure; keep 0: removes the files. Returns the first error, if any; err may be NULL. Where
+ * frames that waited for the limits can't be given to a file, they are kept as FILE.frames.shs in place of that file,
+ * and a warning names it. The other files get all their frames. */
 int record_files_close(struct record_files *files, int keep, struct sh_err *err);
 
 #endif

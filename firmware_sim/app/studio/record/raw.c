@@ -163,7 +163,7 @@ static const struct app_option OPTIONS[] = {
     {APP_TEXT, "relay", "[ADDRESS:]PORT", .at = AT(relay),
      .help = "tcp: listen there (default: 127.0.0.1), and connect each client to SOURCE; both directions are "
              "recorded, until Ctrl-C"},
-    {APP_TEXT, "stats", "FILE", .at = AT(stats), .file = APP_WRITES,
+    {APP_TEXT, "stats", "FILE", .at = AT(stats), .file = APP_FILLS,
      .help = "write the numbers of packets, bytes and dropped packets as JSON; - is standard output"},
     {APP_OUTPUT, "ready-fd", "N", .min = 1, .max = 65535, .at = AT(ready_fd),
      .help = "once it listens, write a line of JSON with the endpoint to descriptor N"},

@@ -4,6 +4,7 @@
 #include <stddef.h>
 #include <stdio.h>
 
+#include "core/newfile.h"
 #include "firmware_sim/app/studio/report/report.h"
 
 static int write_all(struct report *r, struct sh_err *err)
@@ -26,7 +27,8 @@ static int report_report(struct config *cfg, void *ctx, struct sh_err *err)
     app_catch_signals();
     r->cfg = cfg;
     r->cloud_path = r->in.operand[1];
-    int rc = report_work(r, err);
+    int rc = r->html_path != NULL ? newfile_check(r->html_path, err) : SH_OK;
+    if (rc == SH_OK) rc = report_work(r, err);
     if (rc == SH_OK) rc = write_all(r, err);
     report_free(r);
     return rc;

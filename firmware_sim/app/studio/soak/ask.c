@@ -36,12 +36,18 @@ static int is_start(const char *text)
     return strcmp(text, "OK") == 0 || strncmp(text, "ERR -203", 8) == 0 || strncmp(text, "ERR -221", 8) == 0;
 }
 
+/* The last of the four fields names the stream. A list of four, as of FAULt:LIST?, is no identity. */
 static int is_identity(const char *text)
 {
+    static const char last[] = "scanhead native ";
+    const char *field = text;
     int commas = 0;
     for (const char *at = text; *at != '\0'; at++)
-        commas += *at == ',';
-    return commas == 3;
+        if (*at == ',') {
+            commas++;
+            field = at + 1;
+        }
+    return commas == 3 && strncmp(field, last, sizeof last - 1) == 0;
 }
 
 static int is_version(const char *text)
