@@ -101,6 +101,9 @@ static void test_broken_requests(void **state)
         http_get("/cgi/info.json"); /* after the last answer nothing more is answered */
         assert_int_equal(http_rig.len, 0);
         assert_true(len > 0);
+        const uint64_t lost = http_rig.count[PROTOCOL_INPUT_LOST];
+        http_send("abc");
+        assert_int_equal(http_rig.count[PROTOCOL_INPUT_LOST] - lost, 3);
     }
 }
 
