@@ -133,7 +133,8 @@ static void other_images_are_counted(void **state)
     }
 }
 
-/* The packed cells of the last strip or tile are no LZW. The message says which one it is, and gives libtiff's reason. */
+/* The packed cells of the last strip or tile are no LZW. The message says which one it is, and gives libtiff's
+ * reason. */
 static void the_broken_block_is_named(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Numbers of accessors by the table of glTF 2.0 (3.11, "Animations": normalized integers), matrices of nodes, and packed
- * buffers by EXT_meshopt_compression. */
+/* Numbers of accessors by the table of glTF 2.0 (3.11, "Animations": normalized integers), matrices of nodes, and
+ * packed buffers by EXT_meshopt_compression. */
 #include <math.h>
 #include <meshoptimizer.h>
 #include <stdlib.h>

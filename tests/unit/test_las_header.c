@@ -294,7 +294,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_all_of_1_4),  cmocka_unit_test(test_growing), cmocka_unit_test(test_waves),
-        cmocka_unit_test(test_keys_of_1_2), cmocka_unit_test(test_counts), cmocka_unit_test(test_lengths_of_formats),
+        cmocka_unit_test(test_keys_of_1_2), cmocka_unit_test(test_counts),  cmocka_unit_test(test_lengths_of_formats),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
