@@ -79,6 +79,26 @@ static void a_sum_is_fitted(void **state)
     }
 }
 
+/* A sigma that is not that of the pulse adds to the sum of squares: by the variance times (ln(ratio) / 2)^2. The true
+ * term leaves nothing else, so the fit's sum is up to that. */
+static void a_wide_term_costs(void **state)
+{
+    (void)state;
+    static const double variance = 1e-4;
+    const double s = finder_rig_of(w)->spread[0].sigma;
+    const struct finder_run run = window(NULL);
+    for (int k = 0; k < 3; k++) {
+        const double ratio = k == 0 ? 1.5 : k == 1 ? 2.0 : 3.0, q = 0.5 * log(ratio);
+        const struct finder_term want = {60.3, ratio * s, 5.0};
+        const struct finder_task task = {&run, 20, 100, variance};
+        struct finder_mix mix = {.n = 1, .g = {{60.8, 1.2 * ratio * s, 4.0}}};
+        set_sum(&want, 1);
+        finder_mix_fit(&task, &mix);
+        expect_terms(&mix, &want, 1, 1e-3);
+        assert_true(mix.chi2 > 0.9 * variance * q * q && mix.chi2 <= 1.001 * variance * q * q);
+    }
+}
+
 /* The number of terms is not known: there is one maximum for each echo, or fewer. */
 static void sums_are_taken_apart(void **state)
 {
@@ -238,6 +258,7 @@ static void a_height_is_believed_up_to_39_db(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(a_sum_is_fitted),
+                                       cmocka_unit_test(a_wide_term_costs),
                                        cmocka_unit_test(sums_are_taken_apart),
                                        cmocka_unit_test(two_pulses_are_told_by_their_moments),
                                        cmocka_unit_test(weak_pulses_in_noise),
