@@ -128,6 +128,11 @@ static void test_longest(void **state)
                  1024 + more, 0);
         http_send(text);
         assert_int_equal(http_status(), more ? 413 : 404);
+        http_renew();
+        snprintf(text, sizeof text, "POST /cgi/setting HTTP/1.1\r\nHost: x\r\nContent-Length: %d\r\n\r\nrpm=%0*d",
+                 1024 + more, 1020 + more, 900);
+        http_send(text); /* no speed has 1,020 digits; sanitizers look at the copy of the body */
+        assert_int_equal(http_status(), more ? 413 : 400);
     }
 }
 
