@@ -274,7 +274,10 @@ int mount(const char *what, const char *where, const char *type, unsigned long f
         return 0;
     }
     assert_string_equal(type, "functionfs");
-    if (configfs.mount_error != 0) return errno = configfs.mount_error, -1;
+    if (configfs.mount_error != 0) {
+        snprintf(configfs.refused, sizeof configfs.refused, "%s", where);
+        return errno = configfs.mount_error, -1;
+    }
     snprintf(configfs.mounted, sizeof configfs.mounted, "%s", what);
     snprintf(configfs.at, sizeof configfs.at, "%s", where);
     for (int i = 1; i <= 2; i++)

@@ -31,6 +31,7 @@ extern struct configfs {
     uint8_t given[2];        /* the addresses that the controller gives, in the order asked for; 0: it doesn't say */
     unsigned n_given;
     char mounted[64], at[64]; /* the last FunctionFS and its folder */
+    char refused[64];         /* the last folder of a mount that failed */
     char unmounted[200];      /* folders, with a blank after each */
     int was_bound;            /* a gadget was removed while it was bound */
 } configfs;

@@ -328,13 +328,64 @@ static void parts_of_a_footprint(void **state)
     }
 }
 
+/* Counts the sets of places that lie on the same sides of all lines. Sets *margin to the least distance of a place from
+ * a line. */
+static uint32_t count_parts(const struct beam_pattern *fine, const struct beam_line *line, uint32_t n, double *margin)
+{
+    uint8_t seen[1 << BEAM_MAX_LINES] = {0};
+    uint32_t count = 0;
+    *margin = INFINITY;
+    for (uint32_t k = 0; k < fine->n; k++) {
+        uint32_t sides = 0;
+        for (uint32_t i = 0; i < n; i++) {
+            const double d = line[i].n[0] * (double)fine->x[k] + line[i].n[1] * (double)fine->y[k] - line[i].h;
+            *margin = fmin(*margin, fabs(d));
+            sides |= (uint32_t)(d > 0.0) << i;
+        }
+        count += seen[sides] == 0;
+        seen[sides] = 1;
+    }
+    return count;
+}
+
+/* Twelve lines cut the places into up to 70 parts, by the last line's distance. 64 parts are the most that fit. */
+static void footprints_of_many_parts(void **state)
+{
+    (void)state;
+    static const double angle[BEAM_MAX_LINES] = {0.120, 3.443, 0.490, 0.972, 4.533, 1.675,
+                                                 1.455, 4.937, 2.062, 5.232, 2.555, 5.948};
+    static const double h[BEAM_MAX_LINES] = {0.471, 0.289, 0.273, -0.214, 0.426, 0.132,
+                                             0.100, 0.175, 0.366, 0.015,  0.007, 0.104};
+    static struct beam_pattern fine;
+    static struct beam_parts parts;
+    struct beam_line line[BEAM_MAX_LINES];
+    struct beam beam;
+    uint32_t n_exact = 0, n_over = 0;
+    double margin;
+    beam_init(&beam, 0.007, 0.00035, 4e-9);
+    beam_rings(BEAM_FINE_RINGS, &fine);
+    for (int i = 0; i < BEAM_MAX_LINES; i++)
+        line[i] = (struct beam_line){{cos(angle[i]), sin(angle[i])}, h[i]};
+    for (int step = 0; step <= 200; step++) {
+        line[BEAM_MAX_LINES - 1].h = 0.01 * step - 1.0;
+        const uint32_t n = count_parts(&fine, line, BEAM_MAX_LINES, &margin);
+        if (margin < 1e-5) continue; /* the places are floats */
+        assert_int_equal(beam_cut(&beam, &fine, line, BEAM_MAX_LINES, 0, &parts), n > BEAM_MAX_PARTS);
+        assert_int_equal(parts.n, n > BEAM_MAX_PARTS ? 0 : n); /* each place has 0.2 % of the energy */
+        n_exact += n == BEAM_MAX_PARTS;
+        n_over += n == BEAM_MAX_PARTS + 1;
+    }
+    assert_true(n_exact > 0 && n_over > 0);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(parts_beyond_a_line),  cmocka_unit_test(widths_by_definition),
-        cmocka_unit_test(means_on_a_plane),     cmocka_unit_test(widths_on_a_plane),
-        cmocka_unit_test(ranges_within_a_part), cmocka_unit_test(axes_across_a_direction),
-        cmocka_unit_test(rings_of_sub_rays),    cmocka_unit_test(parts_of_a_footprint),
+        cmocka_unit_test(parts_beyond_a_line),      cmocka_unit_test(widths_by_definition),
+        cmocka_unit_test(means_on_a_plane),         cmocka_unit_test(widths_on_a_plane),
+        cmocka_unit_test(ranges_within_a_part),     cmocka_unit_test(axes_across_a_direction),
+        cmocka_unit_test(rings_of_sub_rays),        cmocka_unit_test(parts_of_a_footprint),
+        cmocka_unit_test(footprints_of_many_parts),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

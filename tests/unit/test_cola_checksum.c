@@ -100,6 +100,21 @@ static void values_and_nothing_else(void **state)
     }
 }
 
+/* A telegram of CoLa-A by the manual, whose words up to the channel are as long as a channel's name: the serial number
+ * and both times. Only the digits of the three values change. */
+static void words_are_no_channels(void **state)
+{
+    (void)state;
+    static const char unit[] = "\2sSN LMDscandata 1 1 12345 0 0 1 2 F4240 F4241 0 0 7 0 0 1388 168 0 1 "
+                               "DIST1 3F800000 00000000 FFFD4EC0 1388 3 1B2 1B 1C0 0 0 0 0 0 0\3";
+    uint8_t mask[sizeof unit] = {0};
+    const char *values = strstr(unit, "1B2 1B 1C0");
+    cola_open("LMS111");
+    cola.ops->content((const uint8_t *)unit, sizeof unit - 1, mask);
+    for (const char *at = unit; *at != '\0'; at++)
+        assert_int_equal(mask[at - unit] != 0, at >= values && at < values + 10 && *at != ' ');
+}
+
 /* However short a damaged telegram is, its last byte is taken as the check byte or ETX, and is not changed. */
 static void the_last_byte_stays(void **state)
 {
@@ -139,9 +154,8 @@ static void answers_keep_their_check_byte(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(values_of_all_kinds),
-        cmocka_unit_test(values_and_nothing_else),
-        cmocka_unit_test(the_last_byte_stays),
+        cmocka_unit_test(values_of_all_kinds),           cmocka_unit_test(values_and_nothing_else),
+        cmocka_unit_test(words_are_no_channels),         cmocka_unit_test(the_last_byte_stays),
         cmocka_unit_test(answers_keep_their_check_byte),
     };
     return cmocka_run_group_tests(tests, NULL, cola_teardown);

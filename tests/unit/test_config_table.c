@@ -136,6 +136,8 @@ static void a_section_has_its_keys(void **state)
     free(text);
     assert_int_equal(config_print_section("noises", stdout, &err), SH_EINPUT);
     assert_says("no section \"noises\", did you mean noise?; allowed head, scene, ");
+    assert_int_equal(config_print_section("he", stdout, &err), SH_EINPUT); /* two letters are all of it */
+    assert_says("no section \"he\"; allowed head, scene, ");
     assert_int_equal(config_print_section("", stdout, &err), SH_EINPUT);
 }
 

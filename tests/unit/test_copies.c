@@ -2,7 +2,7 @@
 /* Copies of meshes in a BVH against the same triangles written out. Hits, labels and incidences are the same. */
 #include <math.h>
 
-#include "core/bvh.h"
+#include "core/bvh/bvh_inside.h"
 #include "core/pose.h"
 #include "core/scene_copies.h"
 #include "core/vec3.h"
@@ -358,6 +358,27 @@ static void counts_of_copied_meshes(void **state)
         unlink(file[i]);
 }
 
+/* The memory of a BVH is Embree's and its own. The own part grows by an element for each copy. */
+static void copies_take_memory(void **state)
+{
+    (void)state;
+    struct scene_place place[PLACES];
+    struct bvh_info info;
+    struct sh_err err;
+    int64_t own[2];
+    scatter(place, (const double[3]){0, 0, 0});
+    for (int k = 0; k < 2; k++) {
+        struct scene *scene = load_one(place, k == 0 ? 2 : PLACES, 0, (const double[3]){0, 0, 0});
+        struct bvh *bvh;
+        if (bvh_create(scene, 1, NULL, &bvh, &err) != SH_OK) fail_msg("%s", err.text);
+        bvh_get_info(bvh, &info);
+        own[k] = (int64_t)info.bytes - bvh->bytes;
+        bvh_free(bvh);
+        scene_free(scene);
+    }
+    assert_int_equal(own[1] - own[0], (PLACES - 2) * sizeof(struct bvh_copy));
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -370,6 +391,7 @@ int main(void)
         cmocka_unit_test(planes_of_copies),
         cmocka_unit_test(names_say_which_copy),
         cmocka_unit_test(counts_of_copied_meshes),
+        cmocka_unit_test(copies_take_memory),
     };
     return cmocka_run_group_tests_name("copies", tests, make_folder, remove_folder);
 }

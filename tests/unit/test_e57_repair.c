@@ -63,12 +63,12 @@ static void keep_left(const char *path)
 }
 
 /* Lines have a second or more between them, so that packets are short. The stream's last points are written in the
- * packet that the end of the recording makes. */
-static void record_scans(void)
+ * packet that the end of the recording makes. The third scan has nine lines, or one of shots without echo. */
+static void record_scans(int has_third)
 {
     static struct rig_point p[40];
     struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
-    static const int n_lines[] = {6, 1, 9};
+    const int n_lines[] = {6, 1, has_third ? 9 : 1};
     const char *path = rig_path("a.e57");
     rig_begin();
     for (uint32_t scan = 0; scan < 3; scan++) {
@@ -78,9 +78,10 @@ static void record_scans(void)
         rig_anchor(&a);
         for (uint32_t line = 0; line < (uint32_t)n_lines[scan]; line++) {
             for (int i = 0; i < 40; i++)
-                p[i] = i % 7 == 3 ? (struct rig_point){0, 0, 0, INT16_MIN, 0xffff, 0, 0}
-                                  : (struct rig_point){i + (int)scan, -i, (int)line, (int16_t)(10 * i - (int)line),
-                                                       (uint16_t)i,   1,  1};
+                p[i] = i % 7 == 3 || (scan == 2 && !has_third)
+                           ? (struct rig_point){0, 0, 0, INT16_MIN, 0xffff, 0, 0}
+                           : (struct rig_point){i + (int)scan, -i, (int)line, (int16_t)(10 * i - (int)line),
+                                                (uint16_t)i,   1,  1};
             rig_points(line, 1100 * line, 1100 * line + line % 3, p, 23 + line);
         }
     }
@@ -248,7 +249,7 @@ static void test_cuts(void **state)
         const char *path = rig_path("cut.e57");
         empty_shots = kind > 0;
         coloured = kind > 1;
-        record_scans();
+        record_scans(1);
         read_truth();
         for (size_t len = 0; len <= left_len; len += len % PAGE == 0 ? PAGE - 1 : 1)
             check_cut(path, left, len);
@@ -275,7 +276,7 @@ static void test_end(void **state)
     struct repair repair;
     struct sh_err err;
     empty_shots = coloured = 0;
-    record_scans();
+    record_scans(1);
     read_truth();
     for (size_t cut = 0; cut < whole_len; cut += PAGE)
         check_cut(path, whole, whole_len - cut);
@@ -303,6 +304,32 @@ static void test_end(void **state)
     unlink(path);
 }
 
+/* A scan that has begun has a packet, though it may be empty: other readers look for one at its beginning. Where all
+ * shots of the last scan are left out, a repair makes the file that its recorder makes. */
+static void test_empty_scan(void **state)
+{
+    (void)state;
+    const char *path = rig_path("cut.e57");
+    struct repair repair;
+    struct sh_err err;
+    empty_shots = coloured = 0;
+    record_scans(0);
+    killed_rig_write(path, whole, whole_len);
+    char *want = xml_of(path);
+    e57rig_scan(2, 0, 0);
+    assert_true(e57rig_n_records == 0 && e57rig_n_packets == 1);
+    killed_rig_write(path, left, left_len);
+    assert_int_equal(killed_rig_repair(path, &repair, &err), 0);
+    assert_true(!repair.was_whole && repair.n_scans == 3);
+    char *xml = xml_of(path);
+    assert_string_equal(xml, want);
+    e57rig_scan(2, 0, 0);
+    assert_true(e57rig_n_records == 0 && e57rig_n_packets == 1);
+    free(xml);
+    free(want);
+    unlink(path);
+}
+
 /* A file that is no E57 file of ours, or that is damaged within, is refused in one line and left as it was. */
 static void test_refused(void **state)
 {
@@ -312,7 +339,7 @@ static void test_refused(void **state)
     struct sh_err err;
     size_t len;
     empty_shots = coloured = 0;
-    record_scans();
+    record_scans(1);
     static const char text[3000] = "ply\nformat ascii 1.0\n";
     killed_rig_write(path, text, sizeof text);
     assert_int_equal(killed_rig_repair(path, &repair, &err), SH_EFORMAT);
@@ -352,7 +379,7 @@ static void test_elsewhere(void **state)
     struct repair repair;
     struct sh_err err;
     empty_shots = coloured = 0;
-    record_scans();
+    record_scans(1);
     whole[24] ^= 4;
     reseal(whole);
     killed_rig_write(path, whole, whole_len);
@@ -377,7 +404,7 @@ static void test_absurd(void **state)
     uint32_t random = 12345;
     int refused = 0;
     empty_shots = coloured = 1;
-    record_scans();
+    record_scans(1);
     for (int i = 0; i < 200; i++) {
         uint8_t *file = malloc(left_len);
         memcpy(file, left, left_len);
@@ -415,7 +442,7 @@ static void test_many_zeros(void **state)
     char part[160];
     int n[2];
     snprintf(part, sizeof part, "%s", rig_path("zeros.e57.part"));
-    record_scans();
+    record_scans(1);
     for (int i = 0; i < 2; i++) {
         struct repaired file;
         struct sh_err err = {0};
@@ -443,8 +470,9 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_cuts),      cmocka_unit_test(test_end),    cmocka_unit_test(test_refused),
-        cmocka_unit_test(test_elsewhere), cmocka_unit_test(test_absurd), cmocka_unit_test(test_many_zeros),
+        cmocka_unit_test(test_cuts),       cmocka_unit_test(test_end),    cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_elsewhere),  cmocka_unit_test(test_absurd), cmocka_unit_test(test_many_zeros),
+        cmocka_unit_test(test_empty_scan),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }

@@ -121,6 +121,21 @@ static void test_console_and_stream(void **state)
     expect_gone();
 }
 
+/* A serial number may be as short as one character, and may be missing. */
+static void test_serial_numbers(void **state)
+{
+    (void)state;
+    static const char *const serial[] = {"", "7"};
+    for (int i = 0; i < 2; i++) {
+        struct usb_identity id = identity;
+        snprintf(id.serial, sizeof id.serial, "%s", serial[i]);
+        assert_int_equal(gadget_create(&gadget, &scanhead_usb_model, &id, &err), SH_OK);
+        const char *written = configfs_get(gadget.dir, "strings/0x409/serialnumber");
+        if (written == NULL || strcmp(written, serial[i]) != 0) fail_msg("'%s', not '%s'", written, serial[i]);
+        gadget_remove(&gadget);
+    }
+}
+
 /* A gadget with only a port needs no FunctionFS. */
 static void test_port_alone(void **state)
 {
@@ -289,6 +304,8 @@ static void test_missing_modules(void **state)
     for (int i = 0; i < 3; i++) {
         configfs.mount_error = rows[i].error;
         expect_failure(make(&scanhead_usb_model), rows[i].code, rows[i].text);
+        assert_int_equal(strncmp(configfs.refused, "/tmp/", 5), 0);
+        assert_int_not_equal(access(configfs.refused, F_OK), 0);
     }
 }
 
@@ -404,6 +421,7 @@ int main(void)
         TEST(test_console_and_stream), TEST(test_port_alone),      TEST(test_other_models),
         TEST(test_older_kernels),      TEST(test_no_configfs),     TEST(test_refused_attributes),
         TEST(test_missing_modules),    TEST(test_where_a_port_is), TEST(test_left_behind),
+        TEST(test_serial_numbers),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

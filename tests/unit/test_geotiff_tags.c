@@ -41,7 +41,15 @@ static uint64_t value_of(const struct tag *t, size_t i)
     return v;
 }
 
-/* Head, directory, then the values that don't fit into their entries. */
+static int lowest_free_fd(void)
+{
+    const int fd = dup(STDERR_FILENO);
+    assert_true(fd >= 0);
+    close(fd);
+    return fd;
+}
+
+/* Head, directory, then the values that don't fit into their entries. No descriptor stays open. */
 static int read_made(const struct made *m)
 {
     static uint8_t file[1 << 17];
@@ -66,7 +74,9 @@ static int read_made(const struct made *m)
     }
     memset(&g, 0x55, sizeof g);
     memset(&err, 0, sizeof err);
-    const int rc = geotiff_read(write_file("tags.tif", file, end), &g, &err);
+    write_file("tags.tif", file, end);
+    const int free_fd = lowest_free_fd(), rc = geotiff_read(path, &g, &err);
+    assert_int_equal(lowest_free_fd(), free_fd);
     unlink(path);
     return rc;
 }

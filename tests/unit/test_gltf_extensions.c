@@ -159,7 +159,7 @@ static size_t pack(uint8_t *packed, size_t room)
     return meshopt_encodeVertexBuffer(packed, room, p, 4, sizeof p[0]);
 }
 
-static void try_packed(const char *mode, const char *more, size_t cut, const char *says)
+static void try_strides(const char *mode, const char *more, size_t cut, int stride, const char *says)
 {
     static const unsigned index[6] = {0, 1, 2, 0, 2, 3};
     uint8_t vertices[512], triangles[512];
@@ -172,9 +172,9 @@ static void try_packed(const char *mode, const char *more, size_t cut, const cha
     gltf_block(triangles, m, "");
     const size_t second = (n + 3) & ~(size_t)3;
     snprintf(view[0], sizeof view[0],
-             ",\"byteStride\":12,\"extensions\":{\"EXT_meshopt_compression\":{\"buffer\":0,\"byteLength\":%zu,"
+             ",\"byteStride\":%d,\"extensions\":{\"EXT_meshopt_compression\":{\"buffer\":0,\"byteLength\":%zu,"
              "\"byteStride\":12,\"count\":4,\"mode\":\"%s\"%s}}",
-             n - cut, mode, more);
+             stride, n - cut, mode, more);
     snprintf(view[1], sizeof view[1],
              ",\"extensions\":{\"EXT_meshopt_compression\":{\"buffer\":0,\"byteOffset\":%zu,\"byteLength\":%zu,"
              "\"byteStride\":2,\"count\":6,\"mode\":\"TRIANGLES\"}}",
@@ -196,6 +196,11 @@ static void try_packed(const char *mode, const char *more, size_t cut, const cha
     scene_free(s);
 }
 
+static void try_packed(const char *mode, const char *more, size_t cut, const char *says)
+{
+    try_strides(mode, more, cut, 12, says);
+}
+
 static void meshopt_is_unpacked(void **state)
 {
     (void)state;
@@ -205,6 +210,8 @@ static void meshopt_is_unpacked(void **state)
     try_packed("CURVES", "", 0, "meshopt's mode CURVES is not known");
     try_packed("ATTRIBUTES", ",\"filter\":\"OCTAHEDRAL\"", 0,
                "meshopt does not allow ATTRIBUTES with 4 elements of 12 bytes");
+    try_strides("ATTRIBUTES", "", 0, 16,
+                "bufferViews[2].byteStride is 16, and that of its packed elements 12; allowed is one for both");
 }
 
 /* ---- placement of textures */

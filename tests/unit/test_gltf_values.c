@@ -1,10 +1,16 @@
 /* SPDX-License-Identifier: MIT */
-/* Numbers of accessors by the table of glTF 2.0 (3.11, "Animations": normalized integers), and matrices of nodes. */
+/* Numbers of accessors by the table of glTF 2.0 (3.11, "Animations": normalized integers), matrices of nodes, and
+ * packed buffers by EXT_meshopt_compression. */
 #include <math.h>
+#include <meshoptimizer.h>
+#include <stdlib.h>
 #include <string.h>
 
+#include "core/bytes.h"
 #include "core/import/gltf/gltf_accessor.h"
 #include "core/import/gltf/gltf_matrix.h"
+#include "core/import/gltf/gltf_meshopt.h"
+#include "core/scene/build.h"
 #include "tests/common/cases.h"
 
 /* Bytes of elements lie in two components each, little-endian, with a gap after each element. */
@@ -85,8 +91,93 @@ static void matrices_of_nodes(void **state)
     assert_memory_equal(n, both, sizeof both);
 }
 
+/* ---- packed buffers */
+
+static int unpack(const struct gltf_packed *p, void *out, struct sh_err *err)
+{
+    struct scene_build b = {.name = "m.glb"};
+    struct gltf_bytes bytes;
+    void *own = NULL;
+    const int rc = gltf_meshopt(&b, p, "view", &own, &bytes, err);
+    if (rc == SH_OK) memcpy(out, bytes.p, bytes.n);
+    if (rc == SH_OK) assert_int_equal(bytes.n, p->stride * p->count);
+    free(own);
+    return rc;
+}
+
+/* The sizes that EXT_meshopt_compression allows. No row has data, so an allowed one fails in the decoder. */
+static void sizes_of_meshopt(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *mode, *filter;
+        uint64_t stride, count;
+        int is_allowed;
+    } row[] = {{"ATTRIBUTES", NULL, 0, 4, 0},
+               {"ATTRIBUTES", NULL, 4, 4, 1},
+               {"ATTRIBUTES", NULL, 6, 4, 0},
+               {"ATTRIBUTES", NULL, 256, 4, 1},
+               {"ATTRIBUTES", NULL, 260, 4, 0},
+               {"ATTRIBUTES", "OCTAHEDRAL", 4, 4, 1},
+               {"ATTRIBUTES", "OCTAHEDRAL", 8, 4, 1},
+               {"ATTRIBUTES", "OCTAHEDRAL", 12, 4, 0},
+               {"ATTRIBUTES", "QUATERNION", 8, 4, 1},
+               {"ATTRIBUTES", "QUATERNION", 4, 4, 0},
+               {"ATTRIBUTES", "EXPONENTIAL", 12, 4, 1},
+               {"TRIANGLES", NULL, 2, 6, 1},
+               {"TRIANGLES", "NONE", 4, 6, 1},
+               {"TRIANGLES", NULL, 4, 7, 0},
+               {"TRIANGLES", NULL, 8, 6, 0},
+               {"TRIANGLES", "OCTAHEDRAL", 4, 6, 0},
+               {"TRIANGLES", "EXPONENTIAL", 4, 6, 0},
+               {"INDICES", NULL, 2, 7, 1},
+               {"INDICES", NULL, 4, 7, 1},
+               {"INDICES", NULL, 1, 7, 0},
+               {"INDICES", "QUATERNION", 4, 7, 0},
+               {"INDICES", "EXPONENTIAL", 4, 7, 0}};
+    for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
+        const struct gltf_packed p = {
+            .stride = row[i].stride, .count = row[i].count, .mode = row[i].mode, .filter = row[i].filter};
+        struct sh_err err = {0};
+        assert_int_equal(unpack(&p, NULL, &err), SH_EINPUT);
+        if ((strstr(err.text, "meshopt does not allow") == NULL) != row[i].is_allowed) fail_msg("%zu: %s", i, err.text);
+        if (row[i].is_allowed) assert_non_null(strstr(err.text, "meshoptimizer can't decode it"));
+    }
+}
+
+/* Packed by meshoptimizer and unpacked again: a sequence of indices exactly, and floats that have few bits; unit
+ * vectors within a step of 1/127, unit quaternions within a few steps of 1/32767. */
+static void filters_of_meshopt(void **state)
+{
+    (void)state;
+    static const unsigned index[5] = {7, 7, 3, 900, 0};
+    static const float exact[4] = {1.5f, -2.25f, 1024.0f, 0.0f};
+    static const float unit[2][4] = {{0.6f, 0.0f, -0.8f, 0.0f}, {-0.36f, 0.48f, 0.8f, 0.0f}};
+    static const float turn[2][4] = {{0.5f, -0.5f, 0.5f, 0.5f}, {0.0f, 0.6f, 0.0f, 0.8f}};
+    uint8_t packed[512], filtered[64], out[64];
+    struct sh_err err;
+    size_t n = meshopt_encodeIndexSequence(packed, sizeof packed, index, 5);
+    assert_int_equal(unpack(&(struct gltf_packed){{packed, n}, 4, 5, "INDICES", NULL}, out, &err), SH_OK);
+    assert_memory_equal(out, index, sizeof index);
+    meshopt_encodeFilterExp(filtered, 1, sizeof exact, 24, exact);
+    n = meshopt_encodeVertexBuffer(packed, sizeof packed, filtered, 1, sizeof exact);
+    assert_int_equal(unpack(&(struct gltf_packed){{packed, n}, 16, 1, "ATTRIBUTES", "EXPONENTIAL"}, out, &err), SH_OK);
+    assert_memory_equal(out, exact, sizeof exact);
+    meshopt_encodeFilterOct(filtered, 2, 4, 8, unit[0]);
+    n = meshopt_encodeVertexBuffer(packed, sizeof packed, filtered, 2, 4);
+    assert_int_equal(unpack(&(struct gltf_packed){{packed, n}, 4, 2, "ATTRIBUTES", "OCTAHEDRAL"}, out, &err), SH_OK);
+    for (int i = 0; i < 8; i++)
+        if (i % 4 < 3) assert_true(fabs((int8_t)out[i] / 127.0 - (double)unit[i / 4][i % 4]) <= 1 / 127.0);
+    meshopt_encodeFilterQuat(filtered, 2, 8, 16, turn[0]);
+    n = meshopt_encodeVertexBuffer(packed, sizeof packed, filtered, 2, 8);
+    assert_int_equal(unpack(&(struct gltf_packed){{packed, n}, 8, 2, "ATTRIBUTES", "QUATERNION"}, out, &err), SH_OK);
+    for (int i = 0; i < 8; i++) /* q and -q are one turn; the encoder makes the largest component positive */
+        assert_true(fabs((int16_t)le_get16(out + 2 * i) / 32767.0 - (double)turn[i / 4][i % 4]) <= 4 / 32767.0);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(numbers_of_each_type), cmocka_unit_test(matrices_of_nodes)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(numbers_of_each_type), cmocka_unit_test(matrices_of_nodes),
+                                       cmocka_unit_test(sizes_of_meshopt), cmocka_unit_test(filters_of_meshopt)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -29,10 +29,11 @@ static void test_strings(void **state)
         const char *called = cases[i].called;
         struct scanhead_usb_head head[FAKE_DEVICES];
         struct scanhead *sh;
-        char err[512], other[256];
+        char err[512] = "", other[256];
         bus.device[0] = (struct libusb_device){.present = 1, .maker = called, .product = called, .serial = called};
         bus.device[1] = (struct libusb_device){.present = 1, .other_class = 1, .serial = called};
         assert_int_equal(scanhead_list_usb(head, FAKE_DEVICES, err, sizeof err), 1);
+        assert_string_equal(err, "");
         assert_string_equal(head[0].maker, cases[i].shown);
         assert_string_equal(head[0].product, cases[i].shown);
         assert_string_equal(head[0].serial, cases[i].shown);

@@ -162,7 +162,7 @@ static void expect_text(struct init_text *t, const char *head_end, const char *c
 static void texts(void **state)
 {
     const struct config_profile p = a_profile();
-    const struct scene scene = {.n_triangles = 7, .min_m = {1, 2, 3}, .max_m = {5, 7, 9}};
+    struct scene scene = {.n_triangles = 7, .min_m = {1, 2, 3}, .max_m = {5, 7, 9}};
     struct init_mesh mesh = {.up = SCENE_UP_Y, .scale = 0.001, .up_from = "as it is", .scale_from = "by its size"};
     struct viewpoint at = outside();
     struct init_text t = {.mesh_name = "shown.obj",
@@ -195,8 +195,16 @@ static void texts(void **state)
                 "inside, 1.75 m above a floor; 42 % of the view hits something\n"
                 "  - {name: inside, position_m: [1.5000, 2.5000, 3.5000], heading_deg: 0}",
                 "");
+    struct scene_surface surface[] = {{.material = "pane", .clear = 0.75f},
+                                      {.object = "wall", .material = "stone"},
+                                      {.object = "lamp", .clear = 0.5f}};
+    scene.surface = surface;
+    scene.n_surfaces = 3;
+    mesh.crs[0] = '\0';
     at.kind = VIEWPOINT_GROUND;
-    expect_text(&t, whole, anchor,
+    expect_text(&t, whole,
+                "# The file calls these transparent. To make them glass, remove the # below:\n"
+                "# surfaces: [{material: \"pane\", glass: 0.75}, {object: \"lamp\", glass: 0.5}]\n",
                 "on open ground, 1.75 m above it; 42 % of the view hits something\n"
                 "  - {name: ground, position_m: [1.5000, 2.5000, 3.5000], heading_deg: 0}",
                 "");

@@ -281,11 +281,20 @@ static void test_counts(void **state)
     }
 }
 
+/* The lengths of point formats 0 to 10: tables of ASPRS LAS 1.4 R15. */
+static void test_lengths_of_formats(void **state)
+{
+    (void)state;
+    static const size_t want_len[] = {20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67};
+    for (int format = 0; format <= 10; format++)
+        assert_int_equal(las_format_len(format), want_len[format]);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_all_of_1_4),  cmocka_unit_test(test_growing), cmocka_unit_test(test_waves),
-        cmocka_unit_test(test_keys_of_1_2), cmocka_unit_test(test_counts),
+        cmocka_unit_test(test_keys_of_1_2), cmocka_unit_test(test_counts),  cmocka_unit_test(test_lengths_of_formats),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -353,6 +353,25 @@ static void test_svg(void **state)
     map_free(map);
 }
 
+/* The name and the height of a station, as far as it has them. */
+static void test_titles(void **state)
+{
+    (void)state;
+    struct sh_err err = {0, ""};
+    struct map *map = make(60);
+    add(map, 10, 50, NAN, "both", "z 1.00 m");
+    add(map, 30, 15, 1, "name", "");
+    add(map, 40, 25, 1, "", "z 2.00 m");
+    if (map_write_svg(map, path_in("map.svg"), &err) != SH_OK) fail_msg("%s", err.text);
+    char *xml = read_text(path_in("map.svg"));
+    static const char *const title[] = {"<title>both, z 1.00 m</title>", "<title>name</title>",
+                                        "<title>z 2.00 m</title>"};
+    for (int i = 0; i < 3; i++)
+        if (strstr(xml, title[i]) == NULL) fail_msg("no %s", title[i]);
+    free(xml);
+    map_free(map);
+}
+
 /* ---- the font */
 
 static uint64_t ink_of(const char *text, double *width)
@@ -404,6 +423,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_labels), cmocka_unit_test(test_walls), cmocka_unit_test(test_borders),
         cmocka_unit_test(test_ticks),  cmocka_unit_test(test_svg),   cmocka_unit_test(test_font),
+        cmocka_unit_test(test_titles),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

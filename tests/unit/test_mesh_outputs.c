@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 
 #include "core/bytes.h"
+#include "core/studio/mesh/inside.h"
 #include "core/studio/picture.h"
 #include "tests/unit/mesh_rig.h"
 
@@ -264,12 +265,45 @@ static void fbx_axes_and_time(void **state)
     free(fbx);
 }
 
+/* glTF has 12 bytes for a face, a position and a normal, 8 for texture coordinates and 16 for a colour, which an image
+ * replaces. FBX has three normals of 24 bytes for a face, or three colours of 32. Only a refusal reads no vertex. */
+static void files_of_four_gib_are_refused(void **state)
+{
+    (void)state;
+    enum { N = 100000000 };
+    static const struct mesh_format glb = {.ending = ".glb", .exporter = "glb2"},
+                                    fbx = {.ending = ".fbx", .exporter = "fbx"};
+    static const struct {
+        const struct mesh_format *format;
+        struct mesh mesh;
+        const char *takes;
+    } row[] = {
+        {&glb, {.n_vertices = 4 * (N / 10) * 9, .n_faces = 0}, "0 faces and 360000000 vertices take 4.0 GiB; .glb"},
+        {&glb,
+         {.n_vertices = N, .n_faces = N, .normal = rig_normal, .uv = rig_uv},
+         "100000000 faces and 100000000 vertices take 4.1 GiB; .glb"},
+        {&glb,
+         {.n_vertices = N, .n_faces = N, .normal = rig_normal, .uv = rig_uv, .rgb = rig_rgb, .texture = "a.png"},
+         "vertices take 4.1 GiB; .glb"},
+        {&glb, {.n_vertices = N, .n_faces = N, .normal = rig_normal, .rgb = rig_rgb}, "vertices take 4.8 GiB; .glb"},
+        {&fbx, {.n_vertices = 4, .n_faces = N}, "and 4 vertices take 6.7 GiB in an array; .fbx"},
+        {&fbx, {.n_vertices = 4, .n_faces = N, .rgb = rig_rgb}, "and 4 vertices take 8.9 GiB in an array; .fbx"}};
+    for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
+        struct mesh_output out = {.path = "large"};
+        struct mesh_work work = {0};
+        struct sh_err err = {0};
+        assert_int_equal(mesh_write_assimp(row[i].format, &out, &row[i].mesh, &work, &err), SH_EINPUT);
+        if (strstr(err.text, row[i].takes) == NULL) fail_msg("'%s', not '%s'", err.text, row[i].takes);
+        assert_non_null(strstr(err.text, " holds up to 4 GiB: write .ply or .obj, or scan more coarsely"));
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(images_are_beside_the_mesh), cmocka_unit_test(no_file_stays_alone),
         cmocka_unit_test(a_stop_among_vertices),      cmocka_unit_test(gltf_as_json),
-        cmocka_unit_test(fbx_axes_and_time),
+        cmocka_unit_test(fbx_axes_and_time),          cmocka_unit_test(files_of_four_gib_are_refused),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

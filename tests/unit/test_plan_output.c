@@ -105,6 +105,7 @@ static void the_json_has_each_figure(void **state)
     assert_true(site->plan.n > 2);
     for (size_t i = 0; i < site->plan.n; i++)
         expect_row(&at, &site->plan.row[i], i + 1 == site->plan.n);
+    assert_null(strstr(at, "\"stage\"")); /* no further row */
     free(text);
 }
 

@@ -76,6 +76,26 @@ static void test_settings(void **state)
     room_close(&r);
 }
 
+struct body_pieces {
+    const char *of, *corner, *origin;
+    uint32_t n, triangles;
+};
+
+/* A triangle has its last corner twice. */
+static void compare_piece(void *ctx, uint32_t cell, int n, const double corner[4][3])
+{
+    struct body_pieces *p = ctx;
+    assert_int_equal(le_get32(p->of + 4 * (size_t)p->n), cell);
+    for (int k = 0; k < 4; k++)
+        for (int i = 0; i < 3; i++) {
+            const double want = corner[n == 3 && k == 3 ? 2 : k][i];
+            const char *at = p->corner + 48 * (size_t)p->n + 12 * k + 4 * i;
+            assert_true(fabs((double)le_get_float(at) + le_get_double(p->origin + 8 * i) - want) < 1e-5);
+        }
+    p->n++;
+    p->triangles += n == 3;
+}
+
 /* From the corner of the L all walls are seen. From its right leg the west end of the upper leg is hidden behind the
  * edge. A line from (5, 1) by the edge (2, 2) meets x = 0 at y = 2.67. */
 static void test_cells(void **state)
@@ -98,6 +118,10 @@ static void test_cells(void **state)
     for (uint32_t i = 0; i < n; i++)
         area_m2 += (double)le_get_float(cells.bytes + 48 + 4 * i);
     assert_true(fabs(area_m2 - ROOM_AREA_M2) < 1e-4);
+    struct body_pieces body = {of, corner, cells.bytes + 16, 0, 0};
+    coverage_pieces(r.coverage, compare_piece, &body);
+    assert_int_equal(body.n, pieces);
+    assert_true(body.triangles > 0 && body.triangles < pieces);
     for (uint32_t i = 0; i < pieces; i++) {
         const uint32_t cell = le_get32(of + 4 * i);
         double low_y = INFINITY, low_z = INFINITY, low_x = INFINITY, high_x = -INFINITY;

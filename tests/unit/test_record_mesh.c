@@ -324,6 +324,39 @@ static void two_stations_are_two_objects(void **state)
     free(text);
 }
 
+static void name_surface(void *ctx, uint32_t label, const char **object, const char **material)
+{
+    (void)ctx;
+    *object = label == 0 ? "wall" : "door";
+    *material = "oak";
+}
+
+/* A second scan from a station is an object of another name. The file names the surfaces that the stream names. */
+static void one_station_twice(void **state)
+{
+    (void)state;
+    static uint8_t out[1024];
+    struct native_names names = {0, 2, name_surface, NULL};
+    struct native_descriptor d = descriptor(1);
+    const struct native_anchor a = anchor_of(1);
+    d.n_surfaces = 2;
+    rig_begin();
+    rig_put(out, native_encode_surfaces(out, sizeof out, 1024, &names, 0));
+    put_descriptor(&d);
+    rig_anchor(&a);
+    put_step(0);
+    d.scan = 2;
+    put_descriptor(&d);
+    rig_anchor(&a);
+    put_step(0);
+    char *text = rig_record_bytes("b.obj", (struct recorder_options){.colour = {.given = 1}}, NULL);
+    assert_int_equal(rig_count(text, "\no station 1\n"), 1);
+    has(text, "\no station 1 scan 2 part 2\n");
+    assert_int_equal(rig_count(text, "\no "), 2);
+    has(text, "# label 0 wall | oak\n# label 1 door | oak\n");
+    free(text);
+}
+
 /* ---- more of the stream */
 
 static void later_echoes_and_lines_that_go_back(void **state)
@@ -444,6 +477,7 @@ int main(void)
         cmocka_unit_test(a_wall_beside_the_way),
         cmocka_unit_test(a_full_turn_and_its_texture),
         cmocka_unit_test(two_stations_are_two_objects),
+        cmocka_unit_test(one_station_twice),
         cmocka_unit_test(later_echoes_and_lines_that_go_back),
         cmocka_unit_test(what_can_be_no_mesh),
     };

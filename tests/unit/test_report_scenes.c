@@ -55,9 +55,9 @@ static void write_tiles(int n)
 /* The text has the 20 surfaces with the most points, the page 200, and JSON all of them. */
 static void so_many_surfaces_are_shown(void **state)
 {
-    static const int counts[] = {20, 21, 203};
+    static const int counts[] = {20, 21, 200, 201};
     (void)state;
-    for (int c = 0; c < 3; c++) {
+    for (int c = 0; c < 4; c++) {
         const int n = counts[c], shown = n < 20 ? n : 20, on_page = n < 200 ? n : 200;
         char line[160];
         write_tiles(n);
@@ -160,6 +160,31 @@ static void one_point_in_a_mirror(void **state)
     write_text("g.ply", text);
     does(&app_report, "m.yaml g.ply", 2);
     assert_string_equal(on_err, "scanhead: g.ply: point 2 has label 4; the scene has 4 surfaces, from 0\n");
+}
+
+/* Names of stations cover no other one. Of five stations in one place the first has its name on the right, the others
+ * have theirs on the left, above and below, and there is no room for the fifth. */
+static void names_on_a_map_are_apart(void **state)
+{
+    (void)state;
+    write_tiles(3);
+    write_text(
+        "five.yaml",
+        "head: {profile: sphere, step_deg: 10}\noutput: {crs: local, layout: polar}\n"
+        "scene: {meshes: [{file: tiles.obj, up: z, scale: 1}]}\nstations: [{name: a, position_m: [1.5, 0.5, 2]}, "
+        "{name: b, position_m: [1.5, 0.5, 2]}, {name: c, position_m: [1.5, 0.5, 2]}, "
+        "{name: d, position_m: [1.5, 0.5, 2]}, {name: e, position_m: [1.5, 0.5, 2]}]\n");
+    write_text("five.ply", "ply\nformat ascii 1.0\nelement vertex 2\nproperty double x\nproperty double y\n"
+                           "property double z\nend_header\n0.5 0 0\n2.5 1 0\n");
+    does(&app_report, "five.yaml five.ply --html five.html", 0);
+    char *page = contents("five.html");
+    static const char *const name[] = {"\"start\">1 a</text>", "\"end\">2 b</text>", "\"middle\">3 c</text>",
+                                       "\"middle\">4 d</text>", ">5 e</title>"};
+    for (int i = 0; i < 5; i++)
+        has(page, name[i]);
+    assert_null(strstr(page, ">5 e</text>"));
+    has(page, "There is no room for the names of 1 of them");
+    free(page);
 }
 
 /* The top of a page names the files, the scanner with its noise, and the frame of the coordinates. UTM 33 north is EPSG
@@ -293,7 +318,7 @@ int main(void)
         cmocka_unit_test(so_many_surfaces_are_shown), cmocka_unit_test(points_in_a_mirror_are_left_out),
         cmocka_unit_test(one_point_in_a_mirror),      cmocka_unit_test(the_top_of_a_page),
         cmocka_unit_test(names_are_one_line),         cmocka_unit_test(clouds_that_are_far_or_empty),
-        cmocka_unit_test(points_on_bodies),
+        cmocka_unit_test(points_on_bodies),           cmocka_unit_test(names_on_a_map_are_apart),
     };
     return cmocka_run_group_tests_name("report scenes", tests, go_there, commands_end);
 }

@@ -195,12 +195,43 @@ static void copies_count(void **state)
     }
 }
 
+/* Objects of the scene's own mesh come first. Those of a mesh that is placed keep their own figures. */
+static void copies_beside_a_mesh(void **state)
+{
+    (void)state;
+    struct scene_place place[2] = {{.scale = 1}, {.at_m = {50, 0, 0}, .scale = 2}};
+    char file[2][128];
+    snprintf(file[0], sizeof file[0], "%s", write_text("own.obj", CORNERS "o floor\nf 1 2 3\no wall\nf 1 2 6 5\n"));
+    snprintf(file[1], sizeof file[1], "%s", write_text("placed.obj", BOX "f 5 6 7 8\no lid\nf 5 6 7\n"));
+    const struct scene_mesh_spec spec[2] = {
+        {.file = file[0], .scale = 1},
+        {.file = file[1], .scale = 1, .places = {.place = place, .n = 2, .own_surfaces = 1, .says = "places"}}};
+    static const double area_m2[] = {3, 8, 52, 3, 4 * 52, 4 * 3};
+    static const int n_triangles[] = {1, 2, 12, 1, 12, 1};
+    struct scene *scene;
+    struct scene_objects o;
+    struct sh_err err;
+    if (scene_load(spec, 2, 1e-3, NULL, &scene, &err) != SH_OK) fail_msg("%s", err.text);
+    find(scene, &o);
+    assert_int_equal(o.n, 6);
+    for (uint32_t i = 0; i < o.n; i++) {
+        is_near(o.object[i].area_m2, area_m2[i]);
+        assert_int_equal(o.object[i].n_triangles, n_triangles[i]);
+        assert_int_equal(o.object[i].state == SCENE_OBJECT_CLOSED, n_triangles[i] == 12);
+    }
+    scene_objects_free(&o);
+    scene_free(scene);
+    for (int i = 0; i < 2; i++)
+        unlink(file[i]);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(bodies_are_judged),    cmocka_unit_test(corners_of_faces_are_joined),
         cmocka_unit_test(a_small_hole_is_open), cmocka_unit_test(surfaces_of_a_name_are_one_object),
         cmocka_unit_test(copies_count),         cmocka_unit_test(a_slit_counts_by_its_width),
+        cmocka_unit_test(copies_beside_a_mesh),
     };
     return cmocka_run_group_tests_name("scene_objects", tests, make_folder, remove_folder);
 }

@@ -99,6 +99,17 @@ static void under_the_floor(void **state)
     says("no surface below it, but one 2 m above it: it may be under the floor");
 }
 
+/* Stations after the first one are checked, too. */
+static void each_station_is_checked(void **state)
+{
+    (void)state;
+    write_box(0, 10);
+    load("0, 0, 1.7]}\n  - {position_m: [0, 0, -2]}\n  - {position_m: [0, 0, 900", 1, "", "");
+    says("station 2 station-2 at 0 0 -2 m: no surface below it");
+    says("station 3 station-3 at 0 0 900 m: no surface within range_max_m, 800 m");
+    assert_null(strstr(warned, "station 1 "));
+}
+
 /* The head is in a slab of 20 cm. Except along the slab, all is nearer than the head's least range, 1.5 m. */
 static void within_a_slab(void **state)
 {
@@ -260,6 +271,7 @@ int main(void)
         cmocka_unit_test(out_of_reach),
         cmocka_unit_test(copies_out_of_reach),
         cmocka_unit_test(under_the_floor),
+        cmocka_unit_test(each_station_is_checked),
         cmocka_unit_test(within_a_slab),
         cmocka_unit_test(in_a_corner),
         cmocka_unit_test(beside_a_mesh_that_moves),

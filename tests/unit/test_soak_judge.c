@@ -190,8 +190,11 @@ static void test_connections(void **state)
     soak = soak_rig_make(); /* this fault was not asked for */
     send_clean(soak);
     see_others(soak, FIRST, HIT);
+    assert_int_equal(soak->link[0].in_session, 1);
     soak_saw_end(&soak->link[0]);
+    assert_int_equal(soak->link[0].in_session, 0);
     soak_saw_open(&soak->link[0]);
+    assert_int_equal(soak->link[0].in_session, 0); /* it begins with its first frame */
     assert_true(finish(soak) != 0);
     soak_rig_end(soak);
 }

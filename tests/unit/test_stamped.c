@@ -233,6 +233,10 @@ static void a_stream_has_times_and_an_end(void **state)
     for (int is_reset = 0; is_reset < 2; is_reset++) {
         if (stamped_connect("127.0.0.1", port, WAIT_MS, &fd, &err) != SH_OK) fail_msg("%s", err.text);
         assert_true((fcntl(fd, F_GETFL) & O_NONBLOCK) != 0);
+        int is_tuned = 0;
+        socklen_t len = sizeof is_tuned;
+        assert_int_equal(getsockopt(fd, SOL_SOCKET, SO_KEEPALIVE, &is_tuned, &len), 0);
+        assert_int_equal(is_tuned, 1); /* a device that vanishes ends the connection */
         const int peer = accept(listener, NULL, NULL);
         assert_int_equal(stamped_read(fd, got, sizeof got, &t_ns), 0);
         const int64_t before_ns = stamped_now_ns();

@@ -168,6 +168,22 @@ static void test_frames(void **state)
     assert_int_equal(m.unknown, 0);
 }
 
+/* The frame in which most points agree is taken, though another one that is tried later has a point, too. */
+static void test_most_points_decide(void **state)
+{
+    (void)state;
+    begin();
+    struct cloud cloud = cloud_of(0, N);
+    theirs[N][0] = 3.0 - xyz[7][0]; /* the head's x forward is -x of the scene, and its y is -y */
+    theirs[N][1] = -2.0 - xyz[7][1];
+    theirs[N][2] = xyz[7][2] - 1.5;
+    cloud.n++;
+    const struct match m = try(&cloud, 1e-5);
+    assert_string_equal(m.frame, "scene");
+    assert_int_equal(m.unknown, 1);
+    assert_int_equal(m.first_unknown, N);
+}
+
 /* The client's points, as the head of test_frames has them. */
 static void turn_to_head(void)
 {
@@ -309,11 +325,17 @@ static void test_a_stop(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_a_right_client), cmocka_unit_test(test_unknown_and_empty),
-        cmocka_unit_test(test_repeated),       cmocka_unit_test(test_dense_points),
-        cmocka_unit_test(test_frames),         cmocka_unit_test(test_frames_that_are_not_tried),
-        cmocka_unit_test(test_rounding),       cmocka_unit_test(test_a_huge_coordinate),
-        cmocka_unit_test(test_exact_points),   cmocka_unit_test(test_a_stop),
+        cmocka_unit_test(test_a_right_client),
+        cmocka_unit_test(test_unknown_and_empty),
+        cmocka_unit_test(test_repeated),
+        cmocka_unit_test(test_dense_points),
+        cmocka_unit_test(test_frames),
+        cmocka_unit_test(test_most_points_decide),
+        cmocka_unit_test(test_frames_that_are_not_tried),
+        cmocka_unit_test(test_rounding),
+        cmocka_unit_test(test_a_huge_coordinate),
+        cmocka_unit_test(test_exact_points),
+        cmocka_unit_test(test_a_stop),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -79,6 +79,26 @@ static void a_sum_is_fitted(void **state)
     }
 }
 
+/* A sigma that is not that of the pulse adds to the sum of squares: by the variance times (ln(ratio) / 2)^2. The true
+ * term leaves nothing else, so the fit's sum is up to that. */
+static void a_wide_term_costs(void **state)
+{
+    (void)state;
+    static const double variance = 1e-4;
+    const double s = finder_rig_of(w)->spread[0].sigma;
+    const struct finder_run run = window(NULL);
+    for (int k = 0; k < 3; k++) {
+        const double ratio = k == 0 ? 1.5 : k == 1 ? 2.0 : 3.0, q = 0.5 * log(ratio);
+        const struct finder_term want = {60.3, ratio * s, 5.0};
+        const struct finder_task task = {&run, 20, 100, variance};
+        struct finder_mix mix = {.n = 1, .g = {{60.8, 1.2 * ratio * s, 4.0}}};
+        set_sum(&want, 1);
+        finder_mix_fit(&task, &mix);
+        expect_terms(&mix, &want, 1, 1e-3);
+        assert_true(mix.chi2 > 0.9 * variance * q * q && mix.chi2 <= 1.001 * variance * q * q);
+    }
+}
+
 /* The number of terms is not known: there is one maximum for each echo, or fewer. */
 static void sums_are_taken_apart(void **state)
 {
@@ -128,6 +148,30 @@ static void two_pulses_are_told_by_their_moments(void **state)
             finder_decompose(&run, peak, 1, 1, &mix);
             expect_terms(&mix, want, 2, 0.01);
         }
+}
+
+/* Noise of a fifth of the threshold: a second pulse of 5 sigma is found beside one of 30, and what has 3.5 sigma is no
+ * pulse. The least is 4 sigma. */
+static void weak_pulses_in_noise(void **state)
+{
+    (void)state;
+    struct waveform *noisy = finder_rig_open(0.2);
+    const double s = finder_rig_of(noisy)->spread[0].sigma, width = 2.3548 * s;
+    for (int weak = 0; weak < 2; weak++) {
+        const struct finder_run run = {finder_rig_of(noisy), y, N, NULL, 0.0};
+        const struct finder_term sum[2] = {{60.3, s, 6.0}, {60.3 + 1.2 * width, s, weak ? 0.7 : 1.0}};
+        struct finder_peak peak[FINDER_PEAKS];
+        struct finder_mix mix;
+        set_sum(sum, 2);
+        const uint32_t n = finder_peaks(&run, 1.0, peak, FINDER_PEAKS);
+        assert_int_equal(n, 1);
+        finder_decompose(&run, peak, n, 1, &mix);
+        if (weak)
+            assert_int_equal(mix.n, 1);
+        else
+            expect_terms(&mix, sum, 2, 0.05);
+    }
+    waveform_free(noisy);
 }
 
 /* A top that is limited is found again by its flanks, and so is one that the window cuts off. */
@@ -214,8 +258,10 @@ static void a_height_is_believed_up_to_39_db(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(a_sum_is_fitted),
+                                       cmocka_unit_test(a_wide_term_costs),
                                        cmocka_unit_test(sums_are_taken_apart),
                                        cmocka_unit_test(two_pulses_are_told_by_their_moments),
+                                       cmocka_unit_test(weak_pulses_in_noise),
                                        cmocka_unit_test(tops_that_are_not_seen),
                                        cmocka_unit_test(a_flank_gives_the_whole_pulse),
                                        cmocka_unit_test(a_height_is_believed_up_to_39_db)};

@@ -62,12 +62,16 @@ static int open_part(struct gltf *g, const json_t *object, const char *at, struc
     return SH_OK;
 }
 
-static int open_packed(struct gltf *g, const json_t *more, const char *at, struct gltf_kept *out)
+/* stride: that of the buffer view; 0: it has none. */
+static int open_packed(struct gltf *g, const json_t *more, const char *at, uint64_t stride, struct gltf_kept *out)
 {
     struct gltf_packed p = {.mode = gltf_text(more, "mode"), .filter = gltf_text(more, "filter")};
     int rc = open_part(g, more, at, &p.from);
     if (rc == SH_OK) rc = gltf_whole(g, more, "byteStride", at, &p.stride);
     if (rc == SH_OK) rc = gltf_whole(g, more, "count", at, &p.count);
+    if (rc == SH_OK && stride != 0 && stride != p.stride)
+        return gltf_fail(g, "%s.byteStride is %llu, and that of its packed elements %llu; allowed is one for both", at,
+                         (unsigned long long)stride, (unsigned long long)p.stride);
     return rc == SH_OK ? gltf_meshopt(g->b, &p, at, &out->own, &out->bytes, g->err) : rc;
 }
 
@@ -85,7 +89,7 @@ int gltf_buffer_view(struct gltf *g, uint32_t view, struct gltf_bytes *out, uint
     struct gltf_kept *kept = &g->view[view];
     const json_t *more = meshopt_of(object);
     if (!kept->is_open)
-        rc = more != NULL ? open_packed(g, more, at.text, kept) : open_part(g, object, at.text, &kept->bytes);
+        rc = more != NULL ? open_packed(g, more, at.text, *stride, kept) : open_part(g, object, at.text, &kept->bytes);
     kept->is_open = rc == SH_OK;
     *out = kept->bytes;
     return rc;

@@ -17,8 +17,9 @@ static bool sizes_fit(const struct gltf_packed *p)
     if (is_vertices && (p->stride == 0 || p->stride % 4 != 0 || p->stride > 256)) return false;
     if (!is_vertices && p->stride != 2 && p->stride != 4) return false;
     if (strcmp(p->mode, "TRIANGLES") == 0 && p->count % 3 != 0) return false;
-    if (strcmp(p->filter, "OCTAHEDRAL") == 0) return is_vertices && (p->stride == 4 || p->stride == 8);
-    return strcmp(p->filter, "QUATERNION") != 0 || (is_vertices && p->stride == 8);
+    if (!is_vertices) return strcmp(p->filter, "NONE") == 0;
+    if (strcmp(p->filter, "OCTAHEDRAL") == 0) return p->stride == 4 || p->stride == 8;
+    return strcmp(p->filter, "QUATERNION") != 0 || p->stride == 8;
 }
 
 /* 0, or the decoder's error code for damaged data. */

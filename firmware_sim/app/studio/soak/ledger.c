@@ -342,7 +342,6 @@ void soak_saw_open(struct soak_link *link)
 {
     pthread_mutex_lock(&link->lock);
     link->sessions++;
-    link->in_session = 0; /* until its first frame */
     pthread_mutex_unlock(&link->lock);
 }
 
