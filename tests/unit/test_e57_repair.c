@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* E57 files whose recorder was killed, or whose disk was full: the result of a repair, wherever they end. */
-#include "tests/unit/e57_rig.h"
-#include "tests/unit/killed_rig.h"
+#include "tests/unit/killed_e57_rig.h"
 
-enum { PAGE = 1024, CONTENT = 1020, MAX_PACKETS = 128, MAX_SCANS = 4 };
+enum { MAX_PACKETS = 128, MAX_SCANS = 4 };
 
 /* The complete recording, by its XML and the lengths of its packets: where each scan's packets begin, where each packet
  * ends, and the records up to there. Places count the bytes without the pages' CRCs. */
@@ -12,11 +11,8 @@ static struct {
     int scan;
 } packet[MAX_PACKETS];
 static int n_packets, n_scans;
-static const char MISSING[] = "; repaired: its end is missing";
+static const char MISSING[] = KILLED_E57_MISSING;
 static size_t scan_begin[MAX_SCANS];
-static uint8_t *whole, *left; /* the complete file; what the disk had before it was completed */
-static size_t whole_len, left_len;
-static int empty_shots, coloured;
 
 static size_t logical(size_t physical)
 {
@@ -45,8 +41,8 @@ static void find_packets(void)
             2);
         p = scan_begin[n_scans] = logical(offset) + 32;
         do {
-            n += word_at(whole, p + 6) / 4u; /* the first stream has 4 bytes a record */
-            p += word_at(whole, p + 2) + (size_t)1;
+            n += word_at(killed_e57.whole, p + 6) / 4u; /* the first stream has 4 bytes a record */
+            p += word_at(killed_e57.whole, p + 2) + (size_t)1;
             assert_true(n_packets < MAX_PACKETS);
             packet[n_packets].end = p;
             packet[n_packets].n = n;
@@ -56,42 +52,13 @@ static void find_packets(void)
     }
 }
 
-static void keep_left(const char *path)
-{
-    free(left);
-    left = rig_read(path, &left_len);
-}
+static bool empty_shots, coloured; /* in the recorded files */
 
-/* Lines have a second or more between them, so that packets are short. The stream's last points are written in the
- * packet that the end of the recording makes. The third scan has nine lines, or one of shots without echo. */
-static void record_scans(int has_third)
+static void record_scans(bool has_third, bool with_empty_shots, bool with_colours)
 {
-    static struct rig_point p[40];
-    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
-    const int n_lines[] = {6, 1, has_third ? 9 : 1};
-    const char *path = rig_path("a.e57");
-    rig_begin();
-    for (uint32_t scan = 0; scan < 3; scan++) {
-        a.station = scan + 1;
-        a.anchor[0] += 7;
-        rig_descriptor(1, scan + 1);
-        rig_anchor(&a);
-        for (uint32_t line = 0; line < (uint32_t)n_lines[scan]; line++) {
-            for (int i = 0; i < 40; i++)
-                p[i] = i % 7 == 3 || (scan == 2 && !has_third)
-                           ? (struct rig_point){0, 0, 0, INT16_MIN, 0xffff, 0, 0}
-                           : (struct rig_point){i + (int)scan, -i, (int)line, (int16_t)(10 * i - (int)line),
-                                                (uint16_t)i,   1,  1};
-            rig_points(line, 1100 * line, 1100 * line + line % 3, p, 23 + line);
-        }
-    }
-    const struct colour_choice colour = {.given = coloured, .scale.mode = COLOUR_LABEL};
-    killed_rig_record(path, (struct recorder_options){.empty_shots = empty_shots, .colour = colour}, keep_left);
-    e57rig_read(path);
-    assert_null(strstr(e57rig_xml, MISSING));
-    free(whole);
-    whole = rig_read(path, &whole_len);
-    unlink(path);
+    empty_shots = with_empty_shots;
+    coloured = with_colours;
+    killed_e57_record(has_third, empty_shots, coloured);
     find_packets();
     assert_int_equal(n_scans, 3);
 }
@@ -114,7 +81,7 @@ static void read_truth(void)
     const char *path = rig_path("a.e57");
     free(truth);
     truth = NULL;
-    killed_rig_write(path, whole, whole_len);
+    killed_rig_write(path, killed_e57.whole, killed_e57.whole_len);
     e57rig_read(path);
     for (int k = 0; k < n_scans; k++) {
         e57rig_scan(k, empty_shots, coloured);
@@ -221,11 +188,11 @@ static void check_cut(const char *path, const uint8_t *from, size_t len)
         n += packet[i].n - (i > 0 && packet[i - 1].scan == packet[i].scan ? packet[i - 1].n : 0);
     assert_int_equal(repair.n_kept, n);
     assert_int_equal(repair.n_scans, scans);
-    assert_int_equal(repair.was_whole, from == whole && len == whole_len);
+    assert_int_equal(repair.was_whole, from == killed_e57.whole && len == killed_e57.whole_len);
     if (!repair.was_whole) assert_int_equal(repair.cut_bytes, cut_of(from, len, scans, packets));
     uint8_t *file = rig_read(path, &now);
     if (repair.was_whole) {
-        assert_memory_equal(file, whole, whole_len);
+        assert_memory_equal(file, killed_e57.whole, killed_e57.whole_len);
         free(file);
         return;
     }
@@ -247,12 +214,10 @@ static void test_cuts(void **state)
     (void)state;
     for (int kind = 0; kind < 3; kind++) {
         const char *path = rig_path("cut.e57");
-        empty_shots = kind > 0;
-        coloured = kind > 1;
-        record_scans(1);
+        record_scans(true, kind > 0, kind > 1);
         read_truth();
-        for (size_t len = 0; len <= left_len; len += len % PAGE == 0 ? PAGE - 1 : 1)
-            check_cut(path, left, len);
+        for (size_t len = 0; len <= killed_e57.left_len; len += len % PAGE == 0 ? PAGE - 1 : 1)
+            check_cut(path, killed_e57.left, len);
         already_seen(0, 0, NULL, 0);
         unlink(path);
     }
@@ -275,21 +240,20 @@ static void test_end(void **state)
     const char *path = rig_path("cut.e57");
     struct repair repair;
     struct sh_err err;
-    empty_shots = coloured = 0;
-    record_scans(1);
+    record_scans(true, false, false);
     read_truth();
-    for (size_t cut = 0; cut < whole_len; cut += PAGE)
-        check_cut(path, whole, whole_len - cut);
+    for (size_t cut = 0; cut < killed_e57.whole_len; cut += PAGE)
+        check_cut(path, killed_e57.whole, killed_e57.whole_len - cut);
     already_seen(0, 0, NULL, 0);
-    killed_rig_write(path, whole, whole_len);
+    killed_rig_write(path, killed_e57.whole, killed_e57.whole_len);
     char *want = xml_of(path);
     const size_t end = packet[n_packets - 1].end / CONTENT * PAGE; /* pages before the XML */
     for (int header = 0; header < 2; header++) { /* all headers are missing; then only the file's own */
         size_t len;
-        uint8_t *part = malloc(whole_len);
-        memcpy(part, whole, whole_len);
-        memcpy(part, left, header ? PAGE : left_len / PAGE * PAGE - PAGE);
-        killed_rig_write(path, part, whole_len - (header ? 0 : 1));
+        uint8_t *part = malloc(killed_e57.whole_len);
+        memcpy(part, killed_e57.whole, killed_e57.whole_len);
+        memcpy(part, killed_e57.left, header ? PAGE : killed_e57.left_len / PAGE * PAGE - PAGE);
+        killed_rig_write(path, part, killed_e57.whole_len - (header ? 0 : 1));
         assert_int_equal(killed_rig_repair(path, &repair, &err), 0);
         assert_true(!repair.was_whole && repair.cut_bytes == 0);
         free(part);
@@ -297,7 +261,7 @@ static void test_end(void **state)
         assert_string_equal(xml, want);
         free(xml);
         part = rig_read(path, &len);
-        assert_memory_equal(part + PAGE, whole + PAGE, end - PAGE);
+        assert_memory_equal(part + PAGE, killed_e57.whole + PAGE, end - PAGE);
         free(part);
     }
     free(want);
@@ -312,13 +276,12 @@ static void test_empty_scan(void **state)
     const char *path = rig_path("cut.e57");
     struct repair repair;
     struct sh_err err;
-    empty_shots = coloured = 0;
-    record_scans(0);
-    killed_rig_write(path, whole, whole_len);
+    record_scans(false, false, false);
+    killed_rig_write(path, killed_e57.whole, killed_e57.whole_len);
     char *want = xml_of(path);
     e57rig_scan(2, 0, 0);
     assert_true(e57rig_n_records == 0 && e57rig_n_packets == 1);
-    killed_rig_write(path, left, left_len);
+    killed_rig_write(path, killed_e57.left, killed_e57.left_len);
     assert_int_equal(killed_rig_repair(path, &repair, &err), 0);
     assert_true(!repair.was_whole && repair.n_scans == 3);
     char *xml = xml_of(path);
@@ -330,139 +293,9 @@ static void test_empty_scan(void **state)
     unlink(path);
 }
 
-/* A file that is no E57 file of ours, or that is damaged within, is refused in one line and left as it was. */
-static void test_refused(void **state)
-{
-    (void)state;
-    const char *path = rig_path("cut.e57");
-    struct repair repair;
-    struct sh_err err;
-    size_t len;
-    empty_shots = coloured = 0;
-    record_scans(1);
-    static const char text[3000] = "ply\nformat ascii 1.0\n";
-    killed_rig_write(path, text, sizeof text);
-    assert_int_equal(killed_rig_repair(path, &repair, &err), SH_EFORMAT);
-    killed_rig_write(path, "", 0);
-    assert_int_equal(killed_rig_repair(path, &repair, &err), SH_EFORMAT);
-    for (size_t at = 5; at < left_len - PAGE; at += 2777) {
-        left[at] ^= 0x40;
-        killed_rig_write(path, left, left_len);
-        assert_int_equal(killed_rig_repair(path, &repair, &err), SH_EFORMAT);
-        char want[200];
-        snprintf(want, sizeof want,
-                 "%s: bytes %zu to %zu are damaged, and the file goes on after them; a repair can only cut its end",
-                 path, at / PAGE * PAGE, at / PAGE * PAGE + PAGE);
-        assert_string_equal(err.text, want);
-        uint8_t *now = rig_read(path, &len);
-        assert_true(len == left_len && memcmp(now, left, len) == 0);
-        free(now);
-        left[at] ^= 0x40;
-    }
-    unlink(path);
-}
-
-static void reseal(uint8_t *page)
-{
-    uint32_t crc = 0xffffffff;
-    for (size_t i = 0; i < 8 * CONTENT; i++)
-        crc = (crc & 1) ^ (page[i / 8] >> i % 8 & 1u) ? crc >> 1 ^ 0x82f63b78 : crc >> 1;
-    for (int i = 0; i < 4; i++)
-        page[CONTENT + i] = (uint8_t)(~crc >> (24 - 8 * i));
-}
-
-/* Bytes between our last packet and the XML section are another program's. Such a file is refused and stays. */
-static void test_elsewhere(void **state)
-{
-    (void)state;
-    const char *path = rig_path("cut.e57");
-    struct repair repair;
-    struct sh_err err;
-    empty_shots = coloured = 0;
-    record_scans(1);
-    whole[24] ^= 4;
-    reseal(whole);
-    killed_rig_write(path, whole, whole_len);
-    assert_int_equal(killed_rig_repair(path, &repair, &err), SH_EFORMAT);
-    assert_non_null(strstr(err.text, "was written by another program"));
-    size_t len;
-    uint8_t *now = rig_read(path, &len);
-    assert_int_equal(len, whole_len);
-    assert_memory_equal(now, whole, len);
-    free(now);
-    unlink(path);
-}
-
-/* Any byte of notes, headers and packets may have any value, with a right CRC. The worst result is a refusal, and a
- * repaired file is whole. */
-static void test_absurd(void **state)
-{
-    (void)state;
-    const char *path = rig_path("cut.e57");
-    struct repair repair;
-    struct sh_err err;
-    uint32_t random = 12345;
-    int refused = 0;
-    empty_shots = coloured = 1;
-    record_scans(1);
-    for (int i = 0; i < 200; i++) {
-        uint8_t *file = malloc(left_len);
-        memcpy(file, left, left_len);
-        random = random * 1664525 + 1013904223;
-        const size_t at = i < 100 ? 40 + (size_t)i * 4 : random % left_len / PAGE * PAGE + random % 97 * 10;
-        memset(file + at, i % 2 ? 0xff : (int)(random >> 24), 1 + random % 8);
-        for (size_t p = 0; p + PAGE <= left_len; p += PAGE)
-            reseal(file + p);
-        killed_rig_write(path, file, left_len);
-        free(file);
-        int rc = killed_rig_repair(path, &repair, &err);
-        refused += rc != 0;
-        if (rc != 0) assert_int_equal(rc, SH_EFORMAT);
-        if (rc == 0) e57rig_read(path);
-    }
-    assert_true(refused > 20 && refused < 180);
-    unlink(path);
-}
-
-static int n_asked;
-
-static int count_asked(void *ctx)
-{
-    (void)ctx;
-    n_asked++;
-    return 0;
-}
-
-/* A power cut may leave many pages of zeros. Among these, too, a repair asks whether it has to stop. */
-static void test_many_zeros(void **state)
-{
-    (void)state;
-    enum { PAGES = 20000 };
-    const struct sh_report report = {.stop = count_asked};
-    char part[160];
-    int n[2];
-    snprintf(part, sizeof part, "%s", rig_path("zeros.e57.part"));
-    record_scans(1);
-    for (int i = 0; i < 2; i++) {
-        struct repaired file;
-        struct sh_err err = {0};
-        n_asked = 0;
-        killed_rig_write(part, left, left_len);
-        if (i == 1) assert_int_equal(truncate(part, (off_t)PAGES * PAGE), 0);
-        if (repair_file(part, &report, &file, &err) != 0) fail_msg("%s", err.text);
-        assert_false(file.was_whole);
-        n[i] = n_asked;
-        unlink(file.path);
-        repair_free(&file);
-    }
-    assert_true(n[1] > n[0]);
-}
-
 static int tear_down(void **state)
 {
-    e57rig_free();
-    free(whole);
-    free(left);
+    killed_e57_free();
     free(truth);
     return rig_tear_down(state);
 }
@@ -470,8 +303,8 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_cuts),       cmocka_unit_test(test_end),    cmocka_unit_test(test_refused),
-        cmocka_unit_test(test_elsewhere),  cmocka_unit_test(test_absurd), cmocka_unit_test(test_many_zeros),
+        cmocka_unit_test(test_cuts),
+        cmocka_unit_test(test_end),
         cmocka_unit_test(test_empty_scan),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
