@@ -328,15 +328,18 @@ static int check_ending(const struct app_command *command, const char *label, co
     const char *dot = strrchr(file, '.');
     char ending[16] = "";
     const int is_source = strcmp(label, "SOURCE") == 0, takes_streams = is_source || strstr(label, ".shs") != NULL;
-    if (!takes_streams && strcmp(label, "CONFIG") != 0) return APP_OK;
+    const int takes_clouds = strcmp(label, "CONFIG|CLOUD") == 0;
+    if (!takes_streams && !takes_clouds && strcmp(label, "CONFIG") != 0) return APP_OK;
     for (size_t i = 0; dot != NULL && dot[i] != '\0' && i < sizeof ending - 1; i++)
         ending[i] = (char)tolower((unsigned char)dot[i]);
     for (size_t i = takes_streams ? 1 : 0; i < sizeof others / sizeof others[0] && strlen(ending) > 1; i++) {
         const char *at = strstr(others[i].endings, ending);
         const char after = at != NULL ? at[strlen(ending)] : 'x';
         if (after != '.' && after != '\0') continue;
-        const char *wanted = is_source ? "SOURCE is a head, a recorded stream or a configuration"
-                                       : "CONFIG is a configuration, a YAML file";
+        if (takes_clouds && strstr(".ply.las", ending) != NULL) return APP_OK;
+        const char *wanted = is_source      ? "SOURCE is a head, a recorded stream or a configuration"
+                             : takes_clouds ? "a CONFIG, FILE.ply or FILE.las is needed"
+                                            : "CONFIG is a configuration, a YAML file";
         if (others[i].verb == NULL) return app_usage(command, "%s is %s, and %s", file, others[i].what, wanted);
         return app_usage(command, "%s is %s, and %s: scanhead %s %s%s", file, others[i].what, wanted, others[i].verb,
                          file, others[i].rest);
