@@ -53,24 +53,46 @@ static void add_rgb(const struct part *p, uint32_t i, uint8_t out[4])
     build_rgb(p->g->b, rgb, 255.0, out);
 }
 
-/* corner has places in the list of indices; without that list, places in the list of vertices. */
+/* Takes a corner of the next triangle: place `at` in the list of indices, or without that list, in the list of
+ * vertices. */
+static int take_corner(struct part *p, uint32_t at, int c, uint32_t *vertex)
+{
+    struct scene_build *b = p->g->b;
+    const double number = p->index.count != GLTF_NONE ? gltf_value(&p->index, at, 0) : at;
+    if (number >= (double)p->pose.position.count)
+        return gltf_fail(p->g, "index %.0f out of range; there are %u vertices", number, p->pose.position.count);
+    const uint32_t i = *vertex = (uint32_t)number;
+    int rc = p->vertex[i] == 0 ? add_vertex(p, i) : SH_OK;
+    if (rc != SH_OK) return rc;
+    b->corner[c] = p->vertex[i] - 1;
+    if (b->has_uv) add_uv(p, i, b->corner_uv[c]);
+    if (b->has_rgb) add_rgb(p, i, b->corner_rgb[c]);
+    return SH_OK;
+}
+
+/* glTF 2.0, 3.7.4: where the transform's determinant is negative, the front is clockwise. build_polygon takes the front
+ * as counter-clockwise, so the triangle is turned over. Where joints disagree, those of two corners decide. */
+static bool is_turned_over(const struct part *p, const uint32_t vertex[3])
+{
+    int n = 0;
+    for (int c = 0; c < 3; c++)
+        n += gltf_pose_is_mirrored(&p->pose, p->world, vertex[c]);
+    return n >= 2;
+}
+
+/* corner has three places as take_corner has them. */
 static int add_triangle(struct part *p, const uint32_t corner[3])
 {
     struct scene_build *b = p->g->b;
+    uint32_t vertex[3];
+    int rc = SH_OK;
     b->has_uv = p->uv.count != GLTF_NONE;
     b->has_rgb = p->colour.count != GLTF_NONE;
-    for (int c = 0; c < 3; c++) {
-        const double at = p->index.count != GLTF_NONE ? gltf_value(&p->index, corner[c], 0) : corner[c];
-        if (at >= (double)p->pose.position.count)
-            return gltf_fail(p->g, "index %.0f out of range; there are %u vertices", at, p->pose.position.count);
-        const uint32_t i = (uint32_t)at;
-        int rc = p->vertex[i] == 0 ? add_vertex(p, i) : SH_OK;
-        if (rc != SH_OK) return rc;
-        b->corner[c] = p->vertex[i] - 1;
-        if (b->has_uv) add_uv(p, i, b->corner_uv[c]);
-        if (b->has_rgb) add_rgb(p, i, b->corner_rgb[c]);
-    }
-    int rc = build_polygon(b, 3, p->look.label, p->g->err);
+    for (int c = 0; c < 3 && rc == SH_OK; c++)
+        rc = take_corner(p, corner[c], c, &vertex[c]);
+    if (rc != SH_OK) return rc;
+    if (is_turned_over(p, vertex)) build_turn_over(b, 3);
+    rc = build_polygon(b, 3, p->look.label, p->g->err);
     if (rc == SH_OK && (p->g->n_done++ & 0xffff) == 0)
         rc = build_progress(b, (double)p->g->n_drawn / ((double)p->g->n_nodes + 1.0), p->g->err);
     return rc;
