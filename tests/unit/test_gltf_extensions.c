@@ -57,7 +57,7 @@ static void transparency_is_kept(void **state)
         {"\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,0.25]}", 0.0f, NULL},
         {"\"alphaMode\":\"BLEND\"", 0.0f, NULL},
         {"\"extensions\":{\"KHR_materials_transmission\":{\"transmissionFactor\":0.5}}", 0.5f, NULL},
-        {"\"alphaMode\":\"MASK\",\"alphaCutoff\":1.5", 0.0f, NULL},
+        {"\"alphaMode\":\"MASK\",\"alphaCutoff\":1", 0.0f, NULL},
         {"\"extensions\":{\"KHR_materials_transmission\":{\"transmissionFactor\":1.5}}", 0.0f,
          "1 value of materials left out, since the format doesn't allow them; the first: materials[0]: transmissionF"},
         {"\"alphaMode\":\"BLENDED\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,0.25]}", 0.0f,

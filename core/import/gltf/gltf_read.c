@@ -33,6 +33,14 @@ static void say_counts(const struct gltf *g)
     if (g->n_unweighted > 0)
         build_warn(g->b, "%llu vertices of a skin have no weights: no joint moves them",
                    (unsigned long long)g->n_unweighted);
+    if (g->n_holes > 0)
+        build_warn(g->b, "%llu triangles left out: they have less opacity than their material's alphaCutoff (MASK)",
+                   (unsigned long long)g->n_holes);
+    if (g->n_faded > 0)
+        build_warn(g->b,
+                   "%llu triangles of masked materials have opacities of their corners (COLOR_0): they are read "
+                   "without holes by these",
+                   (unsigned long long)g->n_faded);
     if (g->n_images > 0)
         build_warn(g->b, "%u primitives have a texture of %s, which is not supported: their surfaces have no texture",
                    g->n_images, g->image);
