@@ -2,6 +2,7 @@
 /* scene_load finds the reader of each file by its ending, and makes the scene of all of them. */
 #include <math.h>
 
+#include "core/import/geotiff/geotiff_beside.h"
 #include "core/import/readers.h"
 #include "core/infile.h"
 #include "core/scene/build_load.h"
@@ -83,6 +84,7 @@ static int load_own(const struct scene_mesh_spec *specs, size_t n_specs, double 
         rc = load_file(&b, &specs[i], err);
         n++;
     }
+    if (rc == SH_OK && n > 1) geotiff_warn_beside(specs, n_specs, report);
     if (rc == SH_OK) rc = build_finish(&b, n < n_specs, out, err);
     if (rc == SH_OK) rc = look_for_cutouts(*out, specs, n_specs, report, err);
     build_release(&b);
