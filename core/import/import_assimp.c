@@ -270,6 +270,20 @@ static const struct aiScene *import_file(const struct assimp_lib *lib, struct sc
     return in;
 }
 
+/* Assimp (5.2) ends with an assertion where a Collada node has a skew. */
+static int check_skew(struct scene_build *b, struct sh_err *err)
+{
+    struct text t;
+    if (!text_has_ending(b->spec->file, ".dae")) return SH_OK;
+    int rc = text_open(&t, b->spec->file, NULL, NULL, err);
+    const bool has = rc == SH_OK && memmem(t.data, t.size, "<skew", 5) != NULL;
+    text_close(&t);
+    if (!has) return rc;
+    return build_fail(b, SH_EINPUT, err,
+                      "it has a <skew>, which Assimp can't read; allowed are <matrix>, <translate>, <rotate>, <scale> "
+                      "and <lookat>: write the same as a <matrix>, or convert it to .obj or .ply");
+}
+
 /* The tree's root. An FBX file has no root itself. Assimp adds one, and from 5.4 on turns the file's axes to y up in
  * that root. This turn is undone: the file's axes stay, as with older versions. */
 static struct aiNode root_of(const struct aiScene *in, const char *file)
@@ -286,7 +300,8 @@ int import_assimp(struct scene_build *b, struct sh_err *err)
     struct stat st;
     /* Assimp's C interface reports no progress, so a message at the start says that a large file takes a while. */
     if (stat(b->spec->file, &st) == 0 && st.st_size > 8 << 20) build_announce(b);
-    int rc = assimp_lib_load(&im.lib, err);
+    int rc = check_skew(b, err);
+    if (rc == SH_OK) rc = assimp_lib_load(&im.lib, err);
     if (rc != SH_OK) return rc;
     im.in = import_file(&im.lib, b, &log, err);
     if (im.in == NULL) return SH_EINPUT;

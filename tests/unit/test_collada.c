@@ -179,6 +179,17 @@ static void a_mirrored_node_keeps_its_outer_side(void **state)
     }
 }
 
+/* Assimp would end with an assertion, as if the file were broken. */
+static void a_skew_is_refused(void **state)
+{
+    (void)state;
+    static char text[8192], changed[8192];
+    snprintf(text, sizeof text, DAE, TEXTURE(""), "");
+    const char *node = strstr(text, "<instance_geometry");
+    snprintf(changed, sizeof changed, "%.*s<skew>45 1 0 0 0 1 0</skew>%s", (int)(node - text), text, node);
+    refuse("m.dae", changed, strlen(changed), "it has a <skew>, which Assimp can't read; allowed are <matrix>");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -187,6 +198,7 @@ int main(void)
         cmocka_unit_test(colours_and_transparency),
         cmocka_unit_test(files_are_read_anywhere),
         cmocka_unit_test(a_mirrored_node_keeps_its_outer_side),
+        cmocka_unit_test(a_skew_is_refused),
     };
     return cmocka_run_group_tests_name("collada", tests, make_folder, remove_folder);
 }
