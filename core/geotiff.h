@@ -26,6 +26,7 @@ struct geotiff {
     double easting_m[3], northing_m[3];
     double height_m, height_scale_m; /* height: height_m + height_scale_m * value */
     double no_data;                  /* a value that is no height; NaN: there is none */
+    char odd_no_data[24];            /* the no-data value as the file has it, where it is not one number; else empty */
 };
 
 /* SH_EINPUT names the file: no TIFF, cut off, no place, degrees in place of metres, an unknown system or unit. Where a

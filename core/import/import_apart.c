@@ -224,8 +224,9 @@ static int fail_by_signal(const struct import_apart *a, int number, struct sh_er
             "scene.import_memory_mib is %u: " IMPORT_ELSE_CONVERT,
             a->task.name, a->task.limits.memory_mib);
     return build_fail(a->task.b, SH_EINPUT, err,
-                      "%s crashed while it read the file (SIG%s): the file is broken: " IMPORT_ELSE_CONVERT,
-                      a->task.name, name != NULL ? name : "?");
+                      "%s crashed while it read the file (SIG%s): the file is broken, or %s has a fault "
+                      "itself: " IMPORT_ELSE_CONVERT,
+                      a->task.name, name != NULL ? name : "?", a->task.name);
 }
 
 int import_judge(struct import_apart *a, struct sh_err *err)

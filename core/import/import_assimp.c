@@ -33,6 +33,7 @@ struct import {
     const struct aiScene *in;
     const struct aiMatrix4x4 *level[MAX_DEPTH]; /* matrices from the root to the node; identities left out */
     int n_levels;
+    bool is_mirrored;         /* the levels mirror the mesh at hand */
     struct import_uv uv;      /* of the mesh at hand */
     unsigned n_turned;        /* meshes whose texture is turned */
     double largest;           /* |coordinate| at any level, file units */
@@ -65,6 +66,23 @@ static void transform(const struct aiMatrix4x4 *m, double v[3])
     v[0] = (double)m->a1 * x + (double)m->a2 * y + (double)m->a3 * z + (double)m->a4;
     v[1] = (double)m->b1 * x + (double)m->b2 * y + (double)m->b3 * z + (double)m->b4;
     v[2] = (double)m->c1 * x + (double)m->c2 * y + (double)m->c3 * z + (double)m->c4;
+}
+
+static double determinant(const struct aiMatrix4x4 *m)
+{
+    return (double)m->a1 * ((double)m->b2 * (double)m->c3 - (double)m->b3 * (double)m->c2) -
+           (double)m->a2 * ((double)m->b1 * (double)m->c3 - (double)m->b3 * (double)m->c1) +
+           (double)m->a3 * ((double)m->b1 * (double)m->c2 - (double)m->b2 * (double)m->c1);
+}
+
+/* Whether the levels together mirror a mesh. glTF says that its triangles then face the other way. Collada and FBX say
+ * nothing of it; the programs that write them draw such bodies with the same outer side as others. */
+static bool is_mirrored(const struct import *im)
+{
+    bool is = false;
+    for (int k = 0; k < im->n_levels; k++)
+        if (determinant(im->level[k]) < 0.0) is = !is;
+    return is;
 }
 
 static double largest_of(const double v[3], double largest)
@@ -156,6 +174,7 @@ static int add_face(struct import *im, const struct aiFace *face, const struct a
         b->corner_uv[i][0] = (float)((double)uv[index].x * im->uv.scale[0] + im->uv.shift[0]);
         b->corner_uv[i][1] = (float)((double)uv[index].y * im->uv.scale[1] + im->uv.shift[1]);
     }
+    if (im->is_mirrored) build_turn_over(b, face->mNumIndices);
     return build_polygon(b, face->mNumIndices, label, err);
 }
 
@@ -186,6 +205,7 @@ static int add_mesh(struct import *im, const struct aiNode *node, const struct a
     im->b->mesh = mesh->mName.length > 0 ? mesh->mName.data : node->mName.data;
     int rc = label_of(im, node, mesh, &label, err);
     if (rc == SH_OK) rc = add_vertices(im, mesh, err);
+    im->is_mirrored = is_mirrored(im);
     for (unsigned i = 0; i < mesh->mNumFaces && rc == SH_OK; i++) {
         rc = add_face(im, &mesh->mFaces[i], mesh, label, err);
         if (rc == SH_OK && (im->n_done++ & 0xffff) == 0)
@@ -250,6 +270,20 @@ static const struct aiScene *import_file(const struct assimp_lib *lib, struct sc
     return in;
 }
 
+/* Assimp (5.2) ends with an assertion where a Collada node has a skew. */
+static int check_skew(struct scene_build *b, struct sh_err *err)
+{
+    struct text t;
+    if (!text_has_ending(b->spec->file, ".dae")) return SH_OK;
+    int rc = text_open(&t, b->spec->file, NULL, NULL, err);
+    const bool has = rc == SH_OK && memmem(t.data, t.size, "<skew", 5) != NULL;
+    text_close(&t);
+    if (!has) return rc;
+    return build_fail(b, SH_EINPUT, err,
+                      "it has a <skew>, which Assimp can't read; allowed are <matrix>, <translate>, <rotate>, <scale> "
+                      "and <lookat>: write the same as a <matrix>, or convert it to .obj or .ply");
+}
+
 /* The tree's root. An FBX file has no root itself. Assimp adds one, and from 5.4 on turns the file's axes to y up in
  * that root. This turn is undone: the file's axes stay, as with older versions. */
 static struct aiNode root_of(const struct aiScene *in, const char *file)
@@ -266,7 +300,8 @@ int import_assimp(struct scene_build *b, struct sh_err *err)
     struct stat st;
     /* Assimp's C interface reports no progress, so a message at the start says that a large file takes a while. */
     if (stat(b->spec->file, &st) == 0 && st.st_size > 8 << 20) build_announce(b);
-    int rc = assimp_lib_load(&im.lib, err);
+    int rc = check_skew(b, err);
+    if (rc == SH_OK) rc = assimp_lib_load(&im.lib, err);
     if (rc != SH_OK) return rc;
     im.in = import_file(&im.lib, b, &log, err);
     if (im.in == NULL) return SH_EINPUT;

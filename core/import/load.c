@@ -1,7 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* scene_load finds the reader of each file by its ending, and makes the scene of all of them. */
 #include <math.h>
+#include <stdbool.h>
+#include <string.h>
+#include <strings.h>
 
+#include "core/import/geotiff/geotiff_beside.h"
 #include "core/import/readers.h"
 #include "core/infile.h"
 #include "core/scene/build_load.h"
@@ -32,9 +36,20 @@ static int check_spec(struct scene_build *b, struct sh_err *err)
     return SH_OK;
 }
 
+static bool is_only_an_ending(const char *file)
+{
+    const char *name = basename(file);
+    for (size_t i = 0; i < sizeof readers / sizeof readers[0]; i++)
+        if (strcasecmp(name, readers[i].ending) == 0) return true;
+    return false;
+}
+
 static int load_file(struct scene_build *b, const struct scene_mesh_spec *spec, struct sh_err *err)
 {
     build_begin_file(b, spec);
+    if (is_only_an_ending(spec->file))
+        return build_fail(b, SH_EINPUT, err,
+                          "its name is only an ending; allowed is a name before it: rename the file");
     for (size_t i = 0; i < sizeof readers / sizeof readers[0]; i++) {
         if (!text_has_ending(spec->file, readers[i].ending)) continue;
         int rc = check_spec(b, err);
@@ -83,6 +98,7 @@ static int load_own(const struct scene_mesh_spec *specs, size_t n_specs, double 
         rc = load_file(&b, &specs[i], err);
         n++;
     }
+    if (rc == SH_OK && n > 1) geotiff_warn_beside(specs, n_specs, report);
     if (rc == SH_OK) rc = build_finish(&b, n < n_specs, out, err);
     if (rc == SH_OK) rc = look_for_cutouts(*out, specs, n_specs, report, err);
     build_release(&b);

@@ -38,6 +38,8 @@ struct obj {
     bool label_known;
     uint64_t n_unknown, unknown_line;
     char unknown[32];
+    uint64_t n_calls, call_line;
+    struct text_span call; /* the first file that is called */
 };
 
 static int fail_at(struct obj *o, struct sh_err *err, const char *what)
@@ -245,14 +247,24 @@ static int count_left_out(struct obj *o, bool points)
     return SH_OK;
 }
 
+/* `call` reads the statements of another file, perhaps with faces. */
+static int count_call(struct obj *o)
+{
+    if (o->n_calls++ > 0) return SH_OK;
+    o->call_line = o->t.line;
+    o->call = text_word(&o->t);
+    return SH_OK;
+}
+
 static int read_other(struct obj *o, struct text_span word)
 {
     static const char *const numbers[] = {"vt",  "vn",  "vp",  "s",    "parm", "trim",   "hole", "scrv", "sp",
                                           "end", "con", "deg", "bmat", "step", "cstype", "mg",   NULL};
-    static const char *const texts[] = {"usemap", "maplib",     "lod",       "bevel", "c_interp", "d_interp", "ctech",
-                                        "stech",  "shadow_obj", "trace_obj", "call",  "csh",      NULL};
+    static const char *const texts[] = {"usemap", "maplib", "lod",        "bevel",     "c_interp", "d_interp",
+                                        "ctech",  "stech",  "shadow_obj", "trace_obj", "csh",      NULL};
     static const char *const free_form[] = {"l", "curv", "curv2", "surf", NULL};
     if (text_is_one_of(word, free_form)) return count_left_out(o, false);
+    if (text_is(word, "call")) return count_call(o);
     if (text_is_one_of(word, numbers)) {
         skip_statement(o);
     } else if (!text_is_one_of(word, texts)) {
@@ -318,6 +330,10 @@ int read_obj(struct scene_build *b, struct sh_err *err)
     if (rc == SH_OK && o.n_unknown > 0)
         build_warn(b, "%llu unknown statements ignored; the first is '%s' in line %llu",
                    (unsigned long long)o.n_unknown, o.unknown, (unsigned long long)o.unknown_line);
+    if (rc == SH_OK && o.n_calls > 0)
+        build_warn(b, "%llu statements call another file, which is not read; the first is '%.*s' in line %llu",
+                   (unsigned long long)o.n_calls, o.call.n < 100 ? (int)o.call.n : 100, o.call.p,
+                   (unsigned long long)o.call_line);
     if (rc == SH_OK) rc = read_mtl(b, o.library, o.n_libraries, first_surface, err);
     b->scene->n_meshes++;
     free(o.uv);

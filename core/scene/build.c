@@ -304,6 +304,24 @@ int build_corners(struct scene_build *b, size_t n, struct sh_err *err)
     return build_fail(b, SH_ENOMEM, err, "no memory for a face of %zu corners", n);
 }
 
+/* Swaps elements i and k of an array of elements of up to 8 bytes. */
+static void swap(void *array, size_t size, size_t i, size_t k)
+{
+    uint8_t *a = (uint8_t *)array + i * size, *b = (uint8_t *)array + k * size, old[8];
+    memcpy(old, a, size);
+    memcpy(a, b, size);
+    memcpy(b, old, size);
+}
+
+void build_turn_over(struct scene_build *b, size_t n)
+{
+    for (size_t i = 1, k = n - 1; i < k; i++, k--) {
+        swap(b->corner, sizeof *b->corner, i, k);
+        if (b->has_uv) swap(b->corner_uv, sizeof *b->corner_uv, i, k);
+        if (b->has_rgb) swap(b->corner_rgb, sizeof *b->corner_rgb, i, k);
+    }
+}
+
 /* at: which three of the polygon's corners. */
 static int add_triangle(struct scene_build *b, const uint32_t at[3], uint16_t label, struct sh_err *err)
 {

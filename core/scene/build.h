@@ -48,6 +48,10 @@ int build_vertex(struct scene_build *b, const double v[3], struct sh_err *err);
 
 /* Makes room for n corners in corner, corner_uv and corner_rgb; their contents stay. */
 int build_corners(struct scene_build *b, size_t n, struct sh_err *err);
+/* Reverses the order of the n corners, after the first one: the polygon faces the other way. A reader calls it where a
+ * transform with a negative determinant has mirrored the polygon, so that the outer side of a body stays its outer
+ * side. */
+void build_turn_over(struct scene_build *b, size_t n);
 /* Adds the polygon of the n >= 3 corners in corner. */
 int build_polygon(struct scene_build *b, size_t n, uint16_t label, struct sh_err *err);
 

@@ -3,6 +3,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "core/err.h"
 #include "core/grow.h"
@@ -19,19 +20,37 @@ void triangulate_free(struct triangulate *t)
     *t = (struct triangulate){0};
 }
 
-/* Projects the polygon along the largest component of its normal. Coordinates count from the first corner, since
- * products of UTM coordinates would lose the polygon to rounding. */
-static void project(struct triangulate *t, uint32_t n)
+/* Below this share of the areas that it adds up, a normal may be rounding alone: coordinates of a file often have six
+ * decimals. Then its direction means nothing. */
+#define DOUBTFUL_SHARE 1e-6
+/* Below this share the polygon has no inner side: parts of it turn left, and as much turns right. */
+#define NO_AREA_SHARE 1e-12
+
+/* Adds the triangles of a fan about the first corner. Returns the axis to project along: the largest component of their
+ * sum, or, where they cancel each other as those of a bow-tie do, of the largest triangle. */
+static int choose_axis(struct triangulate *t, uint32_t n, double normal[3])
 {
-    double normal[3] = {0, 0, 0};
+    double largest[3] = {0, 0, 0}, sum = 0;
     for (uint32_t i = 1; i + 1 < n; i++) {
         double across[3];
         vec3_normal(t->at[0].p, t->at[i].p, t->at[i + 1].p, across);
         vec3_add(normal, across, normal);
+        sum += vec3_length(across);
+        if (vec3_length(across) > vec3_length(largest)) memcpy(largest, across, sizeof largest);
     }
+    const double length = vec3_length(normal), *along = length < DOUBTFUL_SHARE * sum ? largest : normal;
+    if (length < NO_AREA_SHARE * sum) t->simple = false;
     int axis = 0;
     for (int k = 1; k < 3; k++)
-        if (fabs(normal[k]) > fabs(normal[axis])) axis = k;
+        if (fabs(along[k]) > fabs(along[axis])) axis = k;
+    return axis;
+}
+
+/* Coordinates count from the first corner, since products of UTM coordinates would lose the polygon to rounding. */
+static void project(struct triangulate *t, uint32_t n)
+{
+    double normal[3] = {0, 0, 0};
+    const int axis = choose_axis(t, n, normal);
     int u = (axis + 1) % 3, v = (axis + 2) % 3;
     if (normal[axis] < 0) {
         int swap = u;

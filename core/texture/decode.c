@@ -268,6 +268,26 @@ static int decode_webp(const struct texture_source *source, const uint8_t *bytes
     return fail_read(source->file, "the WebP data are damaged or cut off", err);
 }
 
+/* Whether a TGA has the columns of its rows from right to left: bit 4 of its descriptor. A TGA has no signature: it is
+ * what is none of the others. */
+static int is_right_to_left(const uint8_t *bytes, size_t n)
+{
+    return n > 18 && !is_png(bytes, n) && !is_jpeg(bytes, n) && memcmp(bytes, "BM", 2) != 0 && (bytes[17] & 0x10) != 0;
+}
+
+/* stb_image reads such rows as if they began at the left. */
+static void reverse_rows(struct texture_image *image)
+{
+    for (size_t y = 0; y < image->height; y++) {
+        uint8_t *row = image->rgba + 4 * y * image->width, texel[4];
+        for (size_t i = 0, k = image->width - 1; i < k; i++, k--) {
+            memcpy(texel, row + 4 * i, 4);
+            memcpy(row + 4 * i, row + 4 * k, 4);
+            memcpy(row + 4 * k, texel, 4);
+        }
+    }
+}
+
 static int decode(const struct texture_source *source, const uint8_t *bytes, size_t n_bytes,
                   struct texture_image *image, struct sh_err *err)
 {
@@ -298,6 +318,7 @@ static int decode(const struct texture_source *source, const uint8_t *bytes, siz
                        TEXTURE_MAX_MEMORY >> 20);
     if (image->rgba == NULL) return fail_read(file, stbi_failure_reason(), err);
     drop_unused_alpha(bytes, image);
+    if (is_right_to_left(bytes, n_bytes)) reverse_rows(image);
     return SH_OK;
 }
 

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "firmware_sim/config/escape.h"
 #include "firmware_sim/site/site.h"
 
 /* Limits the share of light through a pane: it scatters some, even where a file says that all goes through. */
@@ -17,8 +18,8 @@ static int is_decided(const struct scene_surface *s, const struct surface_rule *
     return 0;
 }
 
-/* A byte becomes up to four: a control character is written as \xNN. A wildcard has a backslash before it, which
- * is doubled for YAML. */
+/* A byte becomes up to four: a control character is written as \xNN, and a line end of three bytes as \uNNNN. A
+ * wildcard has a backslash before it, which is doubled for YAML. */
 enum { NAME_ROOM = 4 * SCENE_NAME_LEN };
 
 /* Writes a pattern that fits this name alone, as a double-quoted scalar of YAML. */
@@ -26,14 +27,11 @@ static void quote(const char *name, char out[NAME_ROOM])
 {
     size_t n = 0;
     out[n++] = '"';
-    for (const char *p = name; *p != '\0'; p++) {
-        const unsigned char c = (unsigned char)*p;
+    for (const char *p = name; *p != '\0';) {
+        char one[CONFIG_ESCAPE_ROOM];
         if (*p == '*' || *p == '?') n += (size_t)snprintf(out + n, NAME_ROOM - n, "\\\\"); /* scene_name_fits */
-        if (*p == '"' || *p == '\\') out[n++] = '\\';
-        if (c < 0x20 || c == 0x7f)
-            n += (size_t)snprintf(out + n, NAME_ROOM - n, "\\x%02x", c);
-        else
-            out[n++] = *p;
+        p += config_escape(p, one);
+        n += (size_t)snprintf(out + n, NAME_ROOM - n, "%s", one);
     }
     out[n++] = '"';
     out[n] = '\0';

@@ -105,3 +105,15 @@ double total_area(const struct scene *s)
         area += triangle_area(s, i);
     return area;
 }
+
+double total_volume(const struct scene *s)
+{
+    double six = 0;
+    for (uint32_t i = 0; i < s->n_triangles; i++) {
+        const double *a = s->vertex_m[s->triangle[i][0]], *b = s->vertex_m[s->triangle[i][1]],
+                     *c = s->vertex_m[s->triangle[i][2]];
+        six += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
+               a[2] * (b[0] * c[1] - b[1] * c[0]);
+    }
+    return six / 6;
+}

@@ -150,6 +150,46 @@ static void files_are_read_anywhere(void **state)
     unlink(path);
 }
 
+/* The square, as two triangles or as one polygon, is mirrored at the plane x = 0 of the file. It still looks up, and
+ * texture coordinates stay with their corners: u is x of the file, which is -x now. */
+static void a_mirrored_node_keeps_its_outer_side(void **state)
+{
+    (void)state;
+    static const char triangles[] = "<triangles count=\"2\" material=\"m\">", list[] = "<p>0 1 2 0 2 3</p></triangles>";
+    static char text[8192], changed[8192];
+    for (int is_polygon = 0; is_polygon < 2; is_polygon++) {
+        struct scene *s;
+        struct sh_err err;
+        snprintf(text, sizeof text, DAE, TEXTURE(""), "");
+        const char *node = strstr(text, "<instance_geometry"), *of = strstr(text, triangles), *p = strstr(text, list);
+        snprintf(changed, sizeof changed, "%.*s%s%.*s%s%.*s<scale>-1 1 1</scale>%s", (int)(of - text), text,
+                 is_polygon ? "<polylist count=\"1\" material=\"m\">" : triangles,
+                 (int)(p - of - (long)strlen(triangles)), of + strlen(triangles),
+                 is_polygon ? "<vcount>4</vcount><p>0 1 2 3</p></polylist>" : list,
+                 (int)(node - p - (long)strlen(list)), p + strlen(list), node);
+        const struct scene_mesh_spec spec = {
+            .file = write_text("m.dae", changed), .up = SCENE_UP_Y, .scale = 1, .textures = 1, .offset_m = {0, 0, 1}};
+        if (load_spec(&spec, 1, &s, &err) != SH_OK) fail_msg("%s", err.text);
+        unlink(path);
+        assert_true(s->n_triangles == 2 && s->max_m[0] == 0 && s->min_m[0] == -1);
+        assert_true(fabs(total_volume(s) - 1.0 / 3.0) < 1e-6); /* from the origin up to a square at 1 m */
+        for (int i = 0; i < 6; i++)
+            assert_true((double)s->uv[i / 3][i % 3][0] == -s->vertex_m[s->triangle[i / 3][i % 3]][0]);
+        scene_free(s);
+    }
+}
+
+/* Assimp would end with an assertion, as if the file were broken. */
+static void a_skew_is_refused(void **state)
+{
+    (void)state;
+    static char text[8192], changed[8192];
+    snprintf(text, sizeof text, DAE, TEXTURE(""), "");
+    const char *node = strstr(text, "<instance_geometry");
+    snprintf(changed, sizeof changed, "%.*s<skew>45 1 0 0 0 1 0</skew>%s", (int)(node - text), text, node);
+    refuse("m.dae", changed, strlen(changed), "it has a <skew>, which Assimp can't read; allowed are <matrix>");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -157,6 +197,8 @@ int main(void)
         cmocka_unit_test(a_texture_has_its_set_of_coordinates),
         cmocka_unit_test(colours_and_transparency),
         cmocka_unit_test(files_are_read_anywhere),
+        cmocka_unit_test(a_mirrored_node_keeps_its_outer_side),
+        cmocka_unit_test(a_skew_is_refused),
     };
     return cmocka_run_group_tests_name("collada", tests, make_folder, remove_folder);
 }

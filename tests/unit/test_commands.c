@@ -237,6 +237,10 @@ static void a_first_configuration(void **state)
                                 "it\n");
     does(&app_init, "room.obj -o new.yaml --force --scale 0.001 --up y", 0);
     has(on_out, "size      0.01 x 0.004 x 0.01 m\nunit      0.001 m, ");
+    assert_int_equal(link("room.obj", "a\x80.obj"), 0);
+    does(&app_init, "a\x80.obj -o other.yaml", 2);
+    has(on_err, "its path is not UTF-8, so YAML can't name it; allowed is UTF-8: rename it\n");
+    unlink("a\x80.obj");
 }
 
 /* 50 ms of 36,000 pulses/s, all of which count while the page's observer reads, too. */

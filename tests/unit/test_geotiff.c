@@ -202,6 +202,10 @@ static void holes(void **state)
     assert_non_null(strstr(warnings, "9 of 20 cells have no height, and are holes"));
     assert_non_null(strstr(warnings, "1 heights beside holes touch no triangle"));
     scene_free(s);
+    t.no_data = "none";
+    scene_free(read_tif(&t));
+    assert_non_null(strstr(warnings, "its no-data value is 'none', which is not one number: no height counts as"));
+    t.no_data = "255";
     for (int i = 0; i < 20; i++)
         value[i] = 255;
     refuse_tif(&t, "none of 5 x 4 cells has a height");

@@ -242,20 +242,29 @@ static void numbers_of_metadata(void **state)
     }
 }
 
-/* A no-data value that is not a number is ignored. Its text has up to 62 characters and a NUL. */
+/* A no-data value that is not a number is ignored, and kept for a warning. Its text has up to 62 characters and a NUL. */
 static void no_data_values(void **state)
 {
     (void)state;
     static const struct {
         const char *text;
         double want;
-    } row[] = {{"-9999", -9999.0}, {"0", 0.0}, {"none", NAN}, {"", NAN}, {" 1e3 ", 1000.0}};
+        const char *odd;
+    } row[] = {{"-9999", -9999.0, ""},
+               {"0", 0.0, ""},
+               {"none", NAN, "none"},
+               {"", NAN, ""},
+               {" 1e3 ", 1000.0, ""},
+               {"nan", NAN, ""},
+               {"-9999 -32768", -9999.0, "-9999 -32768"},
+               {"-9999 m above the geoid by", -9999.0, "-9999 m above the geoid"}};
     char text[80];
     for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
         struct made m = usual();
         add_text(&m, 42113, row[i].text);
         ok(&m);
         assert_true(isnan(row[i].want) ? isnan(g.no_data) : g.no_data == row[i].want);
+        assert_string_equal(g.odd_no_data, row[i].odd);
     }
     for (size_t n = 62; n <= 63; n++) {
         struct made m = usual();

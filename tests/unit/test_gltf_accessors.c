@@ -254,23 +254,42 @@ static void nothing_is_read_beyond_the_file(void **state)
     }
 }
 
-/* Four thousand million points have no buffer. No memory is asked for beyond their bytes. */
+/* Four thousand million points, indices or instances have no buffer. They are refused at once, without memory for them,
+ * and without a loop over them. */
 static void absurd_counts_end(void **state)
 {
     (void)state;
     const struct scene_import_limits limits = {.memory_mib = 256, .time_s = 20, .files = 64};
-    gltf_quad();
-    const struct scene_mesh_spec spec = {
-        .file = gltf_write("a.glb", ONE_NODE "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":3}}]}],"
-                                             "\"accessors\":[" GLTF_QUAD_ACCESSORS
-                                             ",{\"componentType\":5126,\"count\":4294967294,\"type\":\"VEC3\"}]"),
-        .scale = 1,
-        .limits = &limits};
-    struct scene *s;
-    struct sh_err err = {0};
-    assert_int_equal(load_spec(&spec, 1, &s, &err), SH_EINPUT);
-    unlink(path);
-    assert_non_null(strstr(err.text, "a.glb"));
+    static const struct {
+        const char *attributes, *node, *component, *type;
+    } tries[] = {
+        {"\"POSITION\":3},\"indices\":2", "", "5126", "VEC3"},
+        {"\"POSITION\":0},\"indices\":3", "", "5125", "SCALAR"},
+        {"\"POSITION\":0},\"indices\":2",
+         ",\"extensions\":{\"EXT_mesh_gpu_instancing\":{\"attributes\":{\"TRANSLATION\":3}}}", "5126", "VEC3"},
+        {"\"POSITION\":0},\"indices\":3", "",
+         "5121,\"sparse\":{\"count\":1,\"indices\":{\"bufferView\":2,\"componentType\":5121},"
+         "\"values\":{\"bufferView\":2}}",
+         "SCALAR"},
+    };
+    for (size_t i = 0; i < sizeof tries / sizeof tries[0]; i++) {
+        char rest[2048];
+        struct scene *s;
+        struct sh_err err = {0};
+        gltf_quad();
+        snprintf(
+            rest, sizeof rest,
+            "\"nodes\":[{\"mesh\":0%s}],\"meshes\":[{\"primitives\":[{\"attributes\":{%s}]}],\"accessors\":[" GLTF_QUAD_ACCESSORS
+            ",{\"componentType\":%s,\"count\":4294967294,\"type\":\"%s\"}]",
+            tries[i].node, tries[i].attributes, tries[i].component, tries[i].type);
+        const struct scene_mesh_spec spec = {.file = gltf_write("a.glb", rest), .scale = 1, .limits = &limits};
+        assert_int_equal(load_spec(&spec, 1, &s, &err), SH_EINPUT);
+        unlink(path);
+        if (strstr(err.text, "a.glb") == NULL ||
+            strstr(err.text, "accessors[3].count is 4294967294, without a bufferView; allowed are up to 16777216") ==
+                NULL)
+            fail_msg("%zu: %s", i, err.text);
+    }
 }
 
 int main(void)

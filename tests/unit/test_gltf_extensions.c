@@ -57,7 +57,7 @@ static void transparency_is_kept(void **state)
         {"\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,0.25]}", 0.0f, NULL},
         {"\"alphaMode\":\"BLEND\"", 0.0f, NULL},
         {"\"extensions\":{\"KHR_materials_transmission\":{\"transmissionFactor\":0.5}}", 0.5f, NULL},
-        {"\"alphaMode\":\"MASK\",\"alphaCutoff\":1.5", 0.0f, NULL},
+        {"\"alphaMode\":\"MASK\",\"alphaCutoff\":1", 0.0f, NULL},
         {"\"extensions\":{\"KHR_materials_transmission\":{\"transmissionFactor\":1.5}}", 0.0f,
          "1 value of materials left out, since the format doesn't allow them; the first: materials[0]: transmissionF"},
         {"\"alphaMode\":\"BLENDED\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,0.25]}", 0.0f,
@@ -308,14 +308,92 @@ static void names_and_data_of_images(void **state)
                 "images[0].uri must have its data in base64");
 }
 
+/* ---- Draco */
+
+#define DRACO "\"extensionsRequired\":[\"KHR_draco_mesh_compression\"%s],"
+/* One primitive without numbers of its own. Its packed bytes are none, so that Assimp refuses the file; the checks come
+ * before that. */
+#define PACKED                                                                                                      \
+    "\"meshes\":[{\"weights\":[%s],\"primitives\":[{\"attributes\":{\"POSITION\":0},\"indices\":1,\"extensions\":{" \
+    "\"KHR_draco_mesh_compression\":{\"bufferView\":0,\"attributes\":{\"POSITION\":0}}}}]}],\"accessors\":["        \
+    "{\"componentType\":5126,\"count\":4,\"type\":\"VEC3\"},{\"componentType\":5123,\"count\":6,\"type\":\"SCALAR\"}]"
+
+/* Assimp unpacks Draco, and is not asked for more: what it ignores is named, or refused where the file requires it. */
+static void what_assimp_ignores_is_named(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *required, *more, *node, *weights, *says;
+    } tries[] = {
+        {"", "", "", "0, 0", NULL},
+        {"", "\"skins\":[{\"joints\":[0]}],", "", "", "ignores: skins; unpack it"},
+        {"", "", ",\"extensions\":{\"EXT_mesh_gpu_instancing\":{\"attributes\":{}}}", "",
+         "ignores: instances (EXT_mesh_gpu_instancing); unpack"},
+        {"", "", ",\"extensions\":{\"KHR_node_visibility\":{\"visible\":false}}", "",
+         "ignores: that nodes are hidden (KHR_node_visibility); unpack"},
+        {"", "", ",\"extensions\":{\"KHR_node_visibility\":{\"visible\":true}}", "", NULL},
+        {"", "", "", "0, 2", "ignores: weights of morph targets; unpack"},
+        {"", "", ",\"weights\":[1]", "2", "ignores: weights of morph targets; unpack"},
+        {"", "\"textures\":[{\"extensions\":{\"EXT_texture_webp\":{\"source\":0}}}],", "", "",
+         "ignores: WebP images; unpack"},
+    };
+    for (size_t i = 0; i < sizeof tries / sizeof tries[0]; i++) {
+        char rest[2048];
+        gltf_quad();
+        snprintf(rest, sizeof rest, DRACO "%s\"nodes\":[{\"mesh\":0%s}]," PACKED, tries[i].required, tries[i].more,
+                 tries[i].node, tries[i].weights);
+        gltf_refuse(rest, "a.glb");
+        const bool is_named =
+            tries[i].says == NULL ? strstr(warnings, "ignores") == NULL : strstr(warnings, tries[i].says) != NULL;
+        if (!is_named) fail_msg("%zu: %s", i, warnings);
+    }
+    static const char *const other[] = {"EXT_mesh_gpu_instancing", "KHR_node_visibility"};
+    for (size_t i = 0; i < sizeof other / sizeof other[0]; i++) {
+        char rest[2048], required[64], says[96];
+        snprintf(required, sizeof required, ",\"%s\"", other[i]);
+        snprintf(says, sizeof says, "it needs KHR_draco_mesh_compression and %s; allowed is one of them", other[i]);
+        gltf_quad();
+        snprintf(rest, sizeof rest, DRACO "\"nodes\":[{\"mesh\":0}]," PACKED, required, "0");
+        gltf_refuse(rest, says);
+    }
+}
+
+/* A file that requires Draco and uses it nowhere is read by the specification: the node's instances are there. */
+static void nothing_packed_needs_no_assimp(void **state)
+{
+    (void)state;
+    static const float shift[2][3] = {{0, 0, 0}, {9, 0, 0}};
+    char rest[2048];
+    gltf_quad();
+    gltf_block(shift, sizeof shift, "");
+    snprintf(rest, sizeof rest,
+             DRACO
+             "\"nodes\":[{\"mesh\":0,\"extensions\":{\"EXT_mesh_gpu_instancing\":{\"attributes\":{"
+             "\"TRANSLATION\":3}}}}],\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0},\"indices\":2}]}],"
+             "\"accessors\":[" GLTF_QUAD_ACCESSORS
+             ",{\"bufferView\":3,\"componentType\":5126,\"count\":2,\"type\":\"VEC3\"}]",
+             "");
+    struct scene *s = gltf_load(rest);
+    assert_int_equal(s->n_triangles, 4);
+    assert_int_equal(n_warnings, 0);
+    scene_free(s);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(required_and_unknown),     cmocka_unit_test(required_and_harmless),
-        cmocka_unit_test(transparency_is_kept),     cmocka_unit_test(images_that_are_not_read),
-        cmocka_unit_test(webp_is_decoded),          cmocka_unit_test(meshopt_is_unpacked),
-        cmocka_unit_test(turned_textures),          cmocka_unit_test(each_material_is_a_surface),
-        cmocka_unit_test(made_names_are_no_others), cmocka_unit_test(names_and_data_of_images),
+        cmocka_unit_test(required_and_unknown),
+        cmocka_unit_test(required_and_harmless),
+        cmocka_unit_test(transparency_is_kept),
+        cmocka_unit_test(images_that_are_not_read),
+        cmocka_unit_test(webp_is_decoded),
+        cmocka_unit_test(meshopt_is_unpacked),
+        cmocka_unit_test(turned_textures),
+        cmocka_unit_test(each_material_is_a_surface),
+        cmocka_unit_test(made_names_are_no_others),
+        cmocka_unit_test(names_and_data_of_images),
+        cmocka_unit_test(what_assimp_ignores_is_named),
+        cmocka_unit_test(nothing_packed_needs_no_assimp),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -36,7 +36,9 @@ static void colours_and_transparency(void **state)
         {"", {1, 1, 1}, 0},
         {"\"pbrMetallicRoughness\":{}", {1, 1, 1}, 0},
         {"\"pbrMetallicRoughness\":{\"baseColorFactor\":[0.25,0.5,0.75,0.125]}", {0.25, 0.5, 0.75}, 0},
-        {"\"alphaMode\":\"MASK\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[0,0.001,1,0.25]}", {0, 0.001, 1}, 0},
+        {"\"alphaMode\":\"MASK\",\"alphaCutoff\":0.25,\"pbrMetallicRoughness\":{\"baseColorFactor\":[0,0.001,1,0.25]}",
+         {0, 0.001, 1},
+         0},
         {"\"alphaMode\":\"BLEND\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,0,0.5,0.25]}", {1, 0, 0.5}, 0.75},
         {"\"alphaMode\":\"BLEND\"", {1, 1, 1}, 0},
         {"\"alphaMode\":\"BLEND\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,0.5,0.25]},\"extensions\":{"
@@ -72,7 +74,7 @@ static void opacities_of_holes(void **state)
                {"\"alphaMode\":\"OPAQUE\",\"alphaCutoff\":0.25", 0},
                {"\"alphaMode\":\"MASK\"", 0.5f},
                {"\"alphaMode\":\"MASK\",\"alphaCutoff\":0.25", 0.25f},
-               {"\"alphaMode\":\"MASK\",\"alphaCutoff\":1.5", 1},
+               {"\"alphaMode\":\"MASK\",\"alphaCutoff\":1", 1},
                {"\"alphaMode\":\"MASK\",\"alphaCutoff\":-1", 0.5f},
                {"\"alphaMode\":\"MASK\",\"alphaCutoff\":\"0.25\"", 0.5f},
                {"\"alphaMode\":\"BLEND\",\"alphaCutoff\":0.25", 0.5f}};
@@ -99,6 +101,59 @@ static void opacities_of_holes(void **state)
         assert_true(s->texture[0].wrap[0] == TEXTURE_REPEAT && s->texture[0].wrap[1] == TEXTURE_REPEAT);
         scene_free(s);
         free(png);
+    }
+}
+
+/* glTF 2.0, 3.9.4: a point is a hole where factor * texture * COLOR_0 is below alphaCutoff. So a texel is one below
+ * alphaCutoff / factor, and all are where factor * COLOR_0 is below alphaCutoff, whatever the texture has. */
+static void opacities_are_multiplied(void **state)
+{
+    (void)state;
+    static const struct {
+        double factor;
+        const char *cutoff;
+        float alpha[4]; /* of the four corners */
+        bool is_textured;
+        float solid; /* below 0: not looked at */
+        uint32_t n;  /* triangles of two that are left */
+        const char *says;
+    } row[] = {{0.8, "", {1, 1, 1, 1}, true, 0.625f, 2, ""},
+               {0.5, "", {1, 1, 1, 1}, true, 1, 2, ""},
+               {0.5, ",\"alphaCutoff\":0.125", {1, 1, 1, 1}, true, 0.25f, 2, ""},
+               {0.4, "", {1, 1, 1, 1}, true, -1, 0, "2 triangles left out: they have less opacity"},
+               {0.4, "", {1, 1, 1, 1}, false, -1, 0, "2 triangles left out: they have less opacity"},
+               {0, "", {1, 1, 1, 1}, true, -1, 0, "2 triangles left out: they have less opacity"},
+               {0, ",\"alphaCutoff\":0", {0, 0, 0, 0}, true, 0, 2, ""},
+               {1, ",\"alphaCutoff\":1.5", {1, 1, 1, 1}, true, -1, 0, "2 triangles left out: they have less opacity"},
+               {1, ",\"alphaCutoff\":1", {1, 1, 1, 1}, true, 1, 2, ""},
+               {0.8, "", {0.5f, 0.5f, 0.25f, 0}, false, -1, 0, "2 triangles left out: they have less opacity"},
+               {1, "", {0, 0, 0, 1}, false, -1, 1, "1 triangles left out: they have less opacity"},
+               {1, "", {0, 0, 0, 1}, false, -1, 1, "1 triangles of masked materials have opacities of their corners"},
+               {1, "", {0.75f, 0.75f, 0.75f, 0.75f}, false, -1, 2, ""},
+               {1, "", {0.75f, 0.75f, 0.75f, 0.75f}, true, 0.5f, 2, "2 triangles of masked materials have opacities"}};
+    for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
+        char rest[4096];
+        float rgba[4][4] = {{0}};
+        for (int k = 0; k < 4; k++)
+            rgba[k][3] = row[i].alpha[k];
+        gltf_quad();
+        gltf_block(rgba, sizeof rgba, "");
+        snprintf(
+            rest, sizeof rest,
+            "\"nodes\":[{\"mesh\":0},{\"mesh\":1}],\"materials\":[{\"alphaMode\":\"MASK\"%s,\"pbrMetallicRoughness\":{"
+            "\"baseColorFactor\":[1,1,1,%g]%s}},{}],\"textures\":[{\"source\":0}],\"images\":[{\"uri\":\"no.png\"}],"
+            "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0,\"TEXCOORD_0\":1,\"COLOR_0\":3},\"indices\":2,"
+            "\"material\":0}]},{\"primitives\":[{\"attributes\":{\"POSITION\":0},\"indices\":2,\"material\":1}]}],"
+            "\"accessors\":[" GLTF_QUAD_ACCESSORS
+            ",{\"bufferView\":3,\"componentType\":5126,\"count\":4,\"type\":\"VEC4\"}]",
+            row[i].cutoff, row[i].factor, row[i].is_textured ? ",\"baseColorTexture\":{\"index\":0}" : "");
+        struct scene *s = gltf_load(rest);
+        if (s->n_triangles != 2 + row[i].n) fail_msg("%zu: %u triangles: %s", i, s->n_triangles, warnings);
+        const float solid = s->surface[0].solid;
+        if (row[i].solid >= 0.0f && solid != row[i].solid) fail_msg("%zu: %g", i, (double)solid);
+        if (strstr(warnings, row[i].says) == NULL) fail_msg("%zu: %s", i, warnings);
+        if (row[i].says[0] == '\0' && strstr(warnings, "triangles") != NULL) fail_msg("%zu: %s", i, warnings);
+        scene_free(s);
     }
 }
 
@@ -129,6 +184,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(colours_and_transparency),
         cmocka_unit_test(opacities_of_holes),
+        cmocka_unit_test(opacities_are_multiplied),
         cmocka_unit_test(images_repeat),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

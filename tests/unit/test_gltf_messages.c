@@ -178,12 +178,26 @@ static void what_is_left_out_is_counted(void **state)
                    "4 vertices of a skin have no weights: no joint moves them");
 }
 
+/* A name ends at a NUL. */
+static void cut_names_are_counted(void **state)
+{
+    (void)state;
+    gltf_quad();
+    struct scene *s = gltf_load(
+        "\"nodes\":[{\"mesh\":0,\"name\":\"wall\\u0000 of\"}],\"materials\":[{\"name\":\"a\\u0000\"}]," MESH ACCESSORS
+        "]");
+    assert_string_equal(s->surface[0].object, "wall");
+    assert_non_null(strstr(warnings, "2 names have a \\u0000, and are read up to there"));
+    scene_free(s);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(contradictions_are_named),    cmocka_unit_test(views_beyond_their_buffer_are_named),
         cmocka_unit_test(versions_and_data_are_named), cmocka_unit_test(cut_files_are_named),
         cmocka_unit_test(buffers_are_named),           cmocka_unit_test(what_is_left_out_is_counted),
+        cmocka_unit_test(cut_names_are_counted),
     };
     return cmocka_run_group_tests_name("messages of glTF", tests, make_folder, remove_folder);
 }

@@ -201,6 +201,53 @@ static void instances_are_written_out(void **state)
     scene_free(scene);
 }
 
+/* glTF 2.0, 3.7.4: a transform with a negative determinant reverses the winding. So the pyramid from the origin to the
+ * quad, 4 by 2 by 2 m, has the volume -16/3 however it is mirrored. */
+static void mirrored_nodes_keep_their_outer_side(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *tree;
+        double factor; /* of the volume: that of the scales */
+    } tries[] = {{"\"nodes\":[{\"mesh\":0}]", 1},
+                 {"\"nodes\":[{\"mesh\":0,\"scale\":[-1,1,1]}]", 1},
+                 {"\"nodes\":[{\"mesh\":0,\"scale\":[-1,-3,1]}]", 3},
+                 {"\"nodes\":[{\"mesh\":0,\"scale\":[-1,-1,-2]}]", 2},
+                 {"\"nodes\":[{\"children\":[1],\"scale\":[1,1,-1]},{\"mesh\":0,\"scale\":[1,-1,1]}]", 1},
+                 {"\"nodes\":[{\"children\":[1],\"scale\":[1,1,-1]},{\"mesh\":0,\"scale\":[1,1,1]}]", 1},
+                 {"\"nodes\":[{\"mesh\":0,\"matrix\":[0,1,0,0, 1,0,0,0, 0,0,1,0, 0,0,0,1]}]", 1}};
+    for (size_t i = 0; i < sizeof tries / sizeof tries[0]; i++) {
+        char rest[2048];
+        gltf_quad();
+        snprintf(rest, sizeof rest, "%s," MESH_AND_ACCESSORS, tries[i].tree);
+        struct scene *s = gltf_load(rest);
+        if (!(fabs(total_volume(s) + tries[i].factor * 16.0 / 3.0) < 1e-12)) fail_msg("%zu: %g", i, total_volume(s));
+        scene_free(s);
+    }
+}
+
+/* Texture coordinates stay with their corners: u = (x + 2) / 4 in the file, and x is mirrored. */
+static void mirrored_instances_keep_their_outer_side(void **state)
+{
+    (void)state;
+    static const float size[2][3] = {{1, 1, 1}, {-1, 1, 1}};
+    gltf_quad();
+    gltf_block(size, sizeof size, "");
+    struct scene *s = gltf_load(
+        "\"nodes\":[{\"mesh\":0,\"extensions\":{\"EXT_mesh_gpu_instancing\":{\"attributes\":{\"SCALE\":3}}}}],"
+        "\"materials\":[{\"pbrMetallicRoughness\":{\"baseColorTexture\":{\"index\":0}}}],\"textures\":[{\"source\":0}],"
+        "\"images\":[{\"uri\":\"none.png\"}],\"meshes\":[" GLTF_QUAD_MESH "],\"accessors\":[" GLTF_QUAD_ACCESSORS
+        ",{\"bufferView\":3,\"componentType\":5126,\"count\":2,\"type\":\"VEC3\"}]");
+    assert_int_equal(s->n_triangles, 4);
+    assert_true(fabs(total_volume(s) + 2.0 * 16.0 / 3.0) < 1e-12);
+    for (uint32_t i = 0; i < 4; i++)
+        for (int c = 0; c < 3; c++) {
+            const double x = s->vertex_m[s->triangle[i][c]][0];
+            assert_true(s->uv != NULL && (double)s->uv[i][c][0] == ((i < 2 ? x : -x) + 2) / 4);
+        }
+    scene_free(s);
+}
+
 /* KHR_node_visibility: nodes below a hidden one are hidden, and reported. */
 static void hidden_nodes_are_left_out(void **state)
 {
@@ -311,6 +358,8 @@ int main(void)
         cmocka_unit_test(indices_of_nothing),
         cmocka_unit_test(a_deep_chain_is_walked),
         cmocka_unit_test(instances_are_written_out),
+        cmocka_unit_test(mirrored_nodes_keep_their_outer_side),
+        cmocka_unit_test(mirrored_instances_keep_their_outer_side),
         cmocka_unit_test(hidden_nodes_are_left_out),
         cmocka_unit_test(skins_in_their_default_pose),
         cmocka_unit_test(morph_targets_by_default_weights),

@@ -272,12 +272,48 @@ static void attributes_that_do_not_fit(void **state)
     }
 }
 
+/* The joints place a mesh with a skin, not its node. A corner belongs to joint 0 (nodes[1]), or to joint 1, which stays
+ * where it was bound. */
+static void mirrored_joints_keep_the_outer_side(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *node, *joint;
+        uint8_t of[4]; /* the joint of each corner */
+        double volume;
+    } tries[] = {{"[1,1,1]", "[1,1,1]", {0}, -16.0 / 3.0},
+                 {"[-1,1,1]", "[1,1,1]", {0}, -16.0 / 3.0},
+                 {"[1,1,1]", "[-1,1,1]", {0}, -16.0 / 3.0},
+                 {"[-1,1,1]", "[1,1,-2]", {0}, -32.0 / 3.0},
+                 {"[1,1,1]", "[-1,1,1]", {1, 1, 1, 1}, -16.0 / 3.0}};
+    for (size_t i = 0; i < sizeof tries / sizeof tries[0]; i++) {
+        char rest[2048];
+        uint8_t of[4][4] = {{0}};
+        static const uint8_t whole[4][4] = {{255}, {255}, {255}, {255}};
+        for (int k = 0; k < 4; k++)
+            of[k][0] = tries[i].of[k];
+        gltf_quad();
+        gltf_block(of, sizeof of, "");
+        gltf_block(whole, sizeof whole, "");
+        snprintf(rest, sizeof rest,
+                 "\"nodes\":[{\"mesh\":0,\"skin\":0,\"scale\":%s},{\"scale\":%s},{}],\"skins\":[{\"joints\":[1,2]}],"
+                 "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0,\"JOINTS_0\":3,\"WEIGHTS_0\":4},"
+                 "\"indices\":2}]}],\"accessors\":[" GLTF_QUAD_ACCESSORS
+                 ",{\"bufferView\":3,\"componentType\":5121,\"count\":4,\"type\":\"VEC4\"},"
+                 "{\"bufferView\":4,\"componentType\":5121,\"normalized\":true,\"count\":4,\"type\":\"VEC4\"}]",
+                 tries[i].node, tries[i].joint);
+        struct scene *s = gltf_load(rest);
+        if (!(fabs(total_volume(s) - tries[i].volume) < 1e-12)) fail_msg("%zu: %g", i, total_volume(s));
+        scene_free(s);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(eight_joints_a_corner),        cmocka_unit_test(eight_sets_a_corner),
         cmocka_unit_test(joints_without_bind_matrices), cmocka_unit_test(skins_that_do_not_fit),
-        cmocka_unit_test(attributes_that_do_not_fit),
+        cmocka_unit_test(attributes_that_do_not_fit),   cmocka_unit_test(mirrored_joints_keep_the_outer_side),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

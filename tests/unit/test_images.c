@@ -159,6 +159,25 @@ static void each_format_has_the_same_picture(void **state)
     check_file(write_file("h.jpg", JPEG, sizeof JPEG), 0, 3);
 }
 
+/* Bit 4 of a TGA's descriptor: rows begin at the right. Their texels are written in that order here. */
+static void rows_may_begin_at_the_right(void **state)
+{
+    (void)state;
+    static uint8_t bytes[8192];
+    for (int i = 0; i < 4; i++) {
+        const int channels = 3 + i / 2;
+        const size_t n = write_tga(bytes, channels, i % 2);
+        bytes[17] |= 0x10;
+        for (int row = 0; row < SIDE; row++)
+            for (int x = 0; x < SIDE; x++) {
+                const uint8_t *c = colour_at(SIDE - 1 - x, i % 2 ? row : SIDE - 1 - row);
+                const uint8_t bgra[4] = {c[2], c[1], c[0], c[3]};
+                memcpy(bytes + 18 + channels * (row * SIDE + x), bgra, (size_t)channels);
+            }
+        check_file(write_file("right.tga", bytes, n), channels == 4, 0);
+    }
+}
+
 /* Assimp passes texels of a file's own images on unpacked. */
 static void unpacked_texels_have_the_same_picture(void **state)
 {
@@ -412,6 +431,7 @@ static void hostile_files_take_no_gigabytes(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(each_format_has_the_same_picture),
+                                       cmocka_unit_test(rows_may_begin_at_the_right),
                                        cmocka_unit_test(unpacked_texels_have_the_same_picture),
                                        cmocka_unit_test(a_jpeg_without_tables_is_grey),
                                        cmocka_unit_test(a_channel_of_zeros_is_no_alpha),

@@ -10,8 +10,10 @@
 #include <string.h>
 
 #include <cmocka.h>
+#include <yaml.h>
 
 #include "firmware_sim/app/studio/init/text.h"
+#include "firmware_sim/config/escape.h"
 #include "firmware_sim/config/profile.h"
 
 #define DEG   (M_PI / 180.0)
@@ -210,9 +212,44 @@ static void texts(void **state)
                 "");
 }
 
+static size_t put_utf8(uint32_t c, char *out)
+{
+    if (c < 0x80) return (size_t)sprintf(out, "%c", (int)c);
+    if (c < 0x800) return (size_t)sprintf(out, "%c%c", (int)(0xc0 | c >> 6), (int)(0x80 | (c & 63)));
+    return (size_t)sprintf(out, "%c%c%c", (int)(0xe0 | c >> 12), (int)(0x80 | (c >> 6 & 63)), (int)(0x80 | (c & 63)));
+}
+
+/* YAML reads each character of a name back, and the comment that begins the file ends at its own line's end. The
+ * characters are those below U+3000, and the byte order mark. */
+static void names_are_read_back(void **state)
+{
+    (void)state;
+    for (uint32_t c = 1; c <= 0x3000; c++) {
+        char name[16] = "a", text[64], *to = text;
+        put_utf8(c < 0x3000 ? c : 0xfeff, name + 1);
+        strcat(name, "b");
+        to += sprintf(to, "# ");
+        for (int pass = 0; pass < 2; pass++) {
+            for (const char *p = name; *p != '\0'; to += strlen(to))
+                p += config_escape(p, to);
+            to += sprintf(to, pass == 0 ? "\n\"" : "\"");
+        }
+        yaml_parser_t parser;
+        yaml_document_t document;
+        assert_int_equal(yaml_parser_initialize(&parser), 1);
+        yaml_parser_set_input_string(&parser, (const unsigned char *)text, strlen(text));
+        if (!yaml_parser_load(&parser, &document)) fail_msg("U+%04x: %s: %s", c, text, parser.problem);
+        const yaml_node_t *node = yaml_document_get_root_node(&document);
+        if (node == NULL || node->type != YAML_SCALAR_NODE || strcmp((char *)node->data.scalar.value, name) != 0)
+            fail_msg("U+%04x: %s", c, text);
+        yaml_document_delete(&document);
+        yaml_parser_delete(&parser);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test(rates), cmocka_unit_test(steps), cmocka_unit_test(windows),
-                                       cmocka_unit_test(texts)};
+                                       cmocka_unit_test(texts), cmocka_unit_test(names_are_read_back)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

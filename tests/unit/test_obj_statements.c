@@ -162,6 +162,10 @@ static void unknown_statements(void **state)
     if (strstr(warnings, "3 unknown statements ignored; the first is 'wavy' in line 4") == NULL)
         fail_msg("%s", warnings);
     scene_free(s);
+    s = load_text("a.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\ncall b.obj 1\nf 1 2 3\ncall c.obj\n");
+    if (strstr(warnings, "2 statements call another file, which is not read; the first is 'b.obj' in line 4") == NULL)
+        fail_msg("%s", warnings);
+    scene_free(s);
     s = load_text("a.obj", "# no statement\nv 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n");
     assert_int_equal(n_warnings, 0);
     scene_free(s);

@@ -178,6 +178,8 @@ static void malformed_files_are_refused(void **state)
         {"a.ply", PLY "0 0 0\n1 0 0\n0 1 0\n", "line 13: face 1 of 1: the file ends before it"},
         {"a.xyz", "", "unknown ending; allowed are .obj .ply"},
         {"obj", "", "unknown ending"},
+        {".obj", "", "its name is only an ending; allowed is a name before it"},
+        {".TIF", "", "its name is only an ending"},
     };
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
         refuse(bad[i].name, bad[i].text, strlen(bad[i].text), bad[i].expected);

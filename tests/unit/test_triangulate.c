@@ -96,6 +96,33 @@ static void crossing_polygon_is_told(void **state)
     scene_free(s);
 }
 
+/* Twice a triangle of 1 m2, once turning left and once right: the normal adds up to 0, or to what rounding leaves of it.
+ * Both triangles that are made of it lie in the plane of the corners. They have 2 m2 each, as any of three corners of a
+ * square have. */
+static void bow_ties_without_area_are_told(void **state)
+{
+    (void)state;
+    static const double square[4][2] = {{0, 0}, {2, 0}, {0, 2}, {2, 2}};
+    for (int axis = 0; axis < 3; axis++)
+        for (int digits = 3; digits < 18; digits++) {
+            char text[512], *p = text;
+            for (int i = 0; i < 4; i++) {
+                double at[3] = {0, 0, 0};
+                at[axis] = square[i][0] * cos(0.4);
+                at[(axis + 1) % 3] = square[i][1];
+                at[(axis + 2) % 3] = square[i][0] * sin(0.4);
+                p += sprintf(p, "v %.*f %.*f %.*f\n", digits, at[0], digits, at[1], digits, at[2]);
+            }
+            sprintf(p, "f 1 2 3 4\n");
+            struct scene *s = load_text("bow.obj", text);
+            assert_int_equal(s->n_triangles, 2);
+            if (strstr(warnings, "bow.obj: the outlines of 1 polygons cross themselves") == NULL)
+                fail_msg("axis %d, %d digits: %s", axis, digits, warnings);
+            if (!(fabs(total_area(s) - 4) < 0.01)) fail_msg("axis %d, %d digits: %g", axis, digits, total_area(s));
+            scene_free(s);
+        }
+}
+
 static void corners_have_a_limit(void **state)
 {
     (void)state;
@@ -113,9 +140,8 @@ static void corners_have_a_limit(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(polygons_keep_their_area),
-        cmocka_unit_test(keyholes_keep_their_area),
-        cmocka_unit_test(crossing_polygon_is_told),
+        cmocka_unit_test(polygons_keep_their_area), cmocka_unit_test(keyholes_keep_their_area),
+        cmocka_unit_test(crossing_polygon_is_told), cmocka_unit_test(bow_ties_without_area_are_told),
         cmocka_unit_test(corners_have_a_limit),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

@@ -246,17 +246,25 @@ static int read_height_unit(const struct reader *r, const char *metadata, double
     return is_named < 0 ? is_named : rc;
 }
 
+/* Takes the number at the text's begin, as GDAL does. */
+static void read_no_data(const struct reader *r, const char *text)
+{
+    char *end;
+    r->g->no_data = strtod(text, &end);
+    if (end == text) r->g->no_data = NAN;
+    if (end[strspn(end, " \t\r\n")] != '\0') snprintf(r->g->odd_no_data, sizeof r->g->odd_no_data, "%.23s", text);
+}
+
 static int read_heights(struct reader *r)
 {
-    char text[64], *end, *metadata = malloc(1 << 16);
+    char text[64], *metadata = malloc(1 << 16);
     double unit_m = 1.0;
     int rc = metadata != NULL ? SH_OK : sh_fail(r->err, SH_ENOMEM, "no memory");
     if (rc == SH_OK) rc = tags_text(&r->tags, GDAL_METADATA, metadata, 1 << 16, r->err);
     if (rc == SH_OK) rc = tags_text(&r->tags, GDAL_NO_DATA, text, sizeof text, r->err);
     if (rc == SH_OK) rc = read_height_unit(r, metadata, &unit_m);
     if (rc == SH_OK) {
-        r->g->no_data = strtod(text, &end);
-        if (end == text) r->g->no_data = NAN;
+        read_no_data(r, text);
         /* As in GDAL, scale and tie point change heights only where these have a system or a unit. */
         const int is_vertical = key(r, VERTICAL) != 0 || key(r, VERTICAL_UNIT) != 0;
         double offset = is_vertical ? r->z_offset : 0.0, scale = is_vertical ? r->z_scale : 1.0;

@@ -355,6 +355,9 @@ static int geotiff_read_say(struct raster *r, struct sh_err *err)
     if (!r->g.unit_given) build_warn(r->b, "it names neither its system nor its unit: metres are assumed");
     if (!r->g.height_unit_given && r->g.unit_m != 1.0)
         build_warn(r->b, "its system is in feet, but its heights have no unit: metres are assumed");
+    if (r->g.odd_no_data[0] != '\0')
+        build_warn(r->b, "its no-data value is '%s', which is not one number: %s", r->g.odd_no_data,
+                   isnan(r->g.no_data) ? "no height counts as missing" : "the first number is taken");
     if (r->g.maps_heights)
         build_warn(r->b,
                    "its ModelPixelScale or ModelTiepoint scales the heights; this is not used, since the file names no "

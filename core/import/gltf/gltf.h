@@ -42,6 +42,8 @@ struct gltf {
     uint32_t n_unmapped;   /* primitives without the texture coordinates that their material asks for */
     uint32_t n_jointless;  /* primitives with a skin, but without JOINTS_0: their node places them */
     uint64_t n_unweighted; /* vertices of a skin that no joint moves */
+    uint64_t n_holes;      /* triangles without opacity, by a masked material or by COLOR_0 */
+    uint64_t n_faded;      /* triangles of masked materials with opacities of COLOR_0 that are not read */
     uint32_t n_images;     /* primitives whose texture has a format that isn't read */
     char image[64];        /* the extension of the first of them */
     uint32_t n_odd;        /* values of materials that the format doesn't allow */

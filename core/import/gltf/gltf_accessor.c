@@ -15,7 +15,7 @@
 #include "core/import/gltf/gltf_json.h"
 #include "core/import/gltf/gltf_meshopt.h"
 
-enum { MAX_STRIDE = 1 << 16 };
+enum { MAX_STRIDE = 1 << 16, MAX_ZEROS = 1 << 24 };
 
 static const struct {
     const char *name;
@@ -160,12 +160,21 @@ static int open_sparse(struct gltf *g, const json_t *sparse, const char *at, uin
 
 /* ---- accessors */
 
+/* An accessor without a buffer view holds zeros. No byte of the file stands for them, so a file of a few hundred bytes
+ * could count billions, and keep the reader busy for minutes. */
+static int check_zeros(struct gltf *g, const char *at, const struct gltf_view *v)
+{
+    if (v->count <= MAX_ZEROS) return SH_OK;
+    return gltf_fail(g, "%s.count is %u, without a bufferView; allowed are up to %d zeros", at, v->count, MAX_ZEROS);
+}
+
 static int open_accessor(struct gltf *g, uint32_t accessor, const json_t *object, struct gltf_view *v)
 {
     const struct gltf_at at = gltf_at("accessors[%u]", accessor);
     const uint32_t size = size_of(v->component) * v->n_components;
     const json_t *sparse = json_object_get(object, "sparse");
-    int rc = json_object_get(object, "bufferView") != NULL ? open_elements(g, object, at.text, size, v) : SH_OK;
+    int rc = json_object_get(object, "bufferView") != NULL ? open_elements(g, object, at.text, size, v)
+                                                           : check_zeros(g, at.text, v);
     if (rc == SH_OK && sparse != NULL) rc = open_sparse(g, sparse, at.text, size, v, &g->accessor[accessor]);
     return rc;
 }

@@ -2,10 +2,10 @@
 /* The list of known extensions, and checks of those that a file names. */
 #include "core/import/gltf/gltf_extensions.h"
 
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
+#include "core/import/gltf/gltf_draco.h"
 #include "core/scene/build.h"
 
 /* A name that ends in * stands for all that begin so. */
@@ -72,47 +72,15 @@ json_t *gltf_extension(const json_t *of, const char *name)
     return json_is_object(found) ? found : NULL;
 }
 
+bool gltf_is_hidden(const json_t *node)
+{
+    return json_is_false(json_object_get(gltf_extension(node, "KHR_node_visibility"), "visible"));
+}
+
 bool gltf_is_by_shaders(const json_t *material)
 {
     return gltf_extension(material, "KHR_techniques_webgl") != NULL ||
            gltf_extension(material, "KHR_technique_webgl") != NULL;
-}
-
-/* Assimp, which unpacks Draco, leaves out or misreads these. */
-static int check_for_assimp(struct scene_build *b, const json_t *root, struct sh_err *err)
-{
-    static const char *const other[] = {"EXT_mesh_gpu_instancing", "KHR_mesh_quantization", "EXT_meshopt_compression",
-                                        "KHR_meshopt_compression"};
-    for (size_t i = 0; i < sizeof other / sizeof other[0]; i++)
-        if (gltf_is_required(root, other[i]))
-            return build_fail(b, SH_EINPUT, err, "it needs KHR_draco_mesh_compression and %s; allowed is one of them",
-                              other[i]);
-    if (json_array_size(json_object_get(root, "skins")) > 0)
-        build_warn(b, "its meshes are packed by Draco, so Assimp reads it, which ignores its skins");
-    return SH_OK;
-}
-
-/* Whether a primitive has its positions only in Draco's form. */
-static bool is_packed(const json_t *root, const json_t *primitive)
-{
-    const json_t *at = json_object_get(json_object_get(primitive, "attributes"), "POSITION");
-    const json_t *position =
-        json_array_get(json_object_get(root, "accessors"), (size_t)fmin(fmax(json_number_value(at), 0.0), 0x1p32));
-    return gltf_extension(primitive, "KHR_draco_mesh_compression") != NULL &&
-           json_object_get(position, "bufferView") == NULL && json_object_get(position, "sparse") == NULL;
-}
-
-/* Whether some primitive is packed, also in a file that doesn't require Draco. Such a file should have plain accessors,
- * too, but some writers leave them out. */
-static bool has_packed(const json_t *root)
-{
-    const json_t *meshes = json_object_get(root, "meshes");
-    for (size_t i = 0; i < json_array_size(meshes); i++) {
-        const json_t *primitives = json_object_get(json_array_get(meshes, i), "primitives");
-        for (size_t k = 0; k < json_array_size(primitives); k++)
-            if (is_packed(root, json_array_get(primitives, k))) return true;
-    }
-    return false;
 }
 
 int gltf_check_extensions(struct scene_build *b, const json_t *root, bool *by_assimp, struct sh_err *err)
@@ -129,6 +97,6 @@ int gltf_check_extensions(struct scene_build *b, const json_t *root, bool *by_as
     warn_unknown(b, used);
     if (is_in(used, "KHR_techniques_webgl") || is_in(used, "KHR_technique_webgl"))
         build_warn(b, "its colours come from shaders (KHR_techniques_webgl), which are not read");
-    *by_assimp = gltf_is_required(root, "KHR_draco_mesh_compression") || has_packed(root);
-    return *by_assimp ? check_for_assimp(b, root, err) : SH_OK;
+    *by_assimp = gltf_has_packed(root);
+    return *by_assimp ? gltf_check_for_assimp(b, root, err) : SH_OK;
 }

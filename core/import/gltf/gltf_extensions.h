@@ -17,6 +17,8 @@ bool gltf_is_required(const json_t *root, const char *extension);
 
 /* NULL where the object has no such extension. */
 json_t *gltf_extension(const json_t *of, const char *name);
+/* Whether KHR_node_visibility hides a node, and the nodes below it. */
+bool gltf_is_hidden(const json_t *node);
 /* Whether a material has its colours by shaders, which are not read. */
 bool gltf_is_by_shaders(const json_t *material);
 

@@ -224,17 +224,6 @@ static int read_lay(struct gltf *g, const json_t *info, const char *at, struct g
 
 /* ---- materials */
 
-/* Returns the opacity below which a material has holes. For OPAQUE and MASK the format gives the figure. For BLEND
- * the format gives none, so this reader takes 0.5. */
-static float solid_of(const json_t *material)
-{
-    const char *mode = gltf_text(material, "alphaMode");
-    const json_t *cutoff = json_object_get(material, "alphaCutoff");
-    if (!is_mode(mode) || strcmp(mode, "OPAQUE") == 0) return 0.0f;
-    if (strcmp(mode, "MASK") != 0 || !json_is_number(cutoff) || json_number_value(cutoff) < 0.0) return 0.5f;
-    return (float)fmin(json_number_value(cutoff), 1.0);
-}
-
 /* The keys of the base colour. KHR_materials_pbrSpecularGlossiness has names of its own for them. */
 struct base {
     json_t *of;
@@ -277,6 +266,45 @@ static int keep_colour(struct gltf *g, const struct base *base, const char *at, 
     return rc;
 }
 
+/* ---- holes */
+
+static bool is_masked(const json_t *material)
+{
+    const char *mode = gltf_text(material, "alphaMode");
+    return mode != NULL && strcmp(mode, "MASK") == 0;
+}
+
+/* alphaCutoff, by default 0.5. */
+static double cutoff_of(const json_t *material)
+{
+    const json_t *cutoff = json_object_get(material, "alphaCutoff");
+    return json_is_number(cutoff) && json_number_value(cutoff) >= 0.0 ? json_number_value(cutoff) : 0.5;
+}
+
+/* glTF 2.0, 3.9.4: a point of a masked material is a hole where the product of three opacities, those of the base
+ * colour, the texture and COLOR_0, is below alphaCutoff. The base colour has one opacity for all points. */
+static int read_mask(struct gltf *g, const struct base *base, const json_t *material, const char *at,
+                     struct gltf_look *look)
+{
+    double rgba[4] = {1, 1, 1, 1};
+    if (!is_masked(material)) return SH_OK;
+    int rc = gltf_numbers(g, base->of, base->factor, at, 4, rgba);
+    look->opacity = rgba[3] >= 0.0 && rgba[3] <= 1.0 ? rgba[3] : 1.0; /* note_odd has counted another one */
+    look->cutoff = g->b->spec->cutouts ? cutoff_of(material) : 0.0;
+    return rc;
+}
+
+/* Returns the opacity of a texture below which a material has holes. For OPAQUE and MASK the format gives the figure.
+ * For BLEND the format gives none, so this reader takes 0.5. */
+static float solid_of(const json_t *material, const struct gltf_look *look)
+{
+    const char *mode = gltf_text(material, "alphaMode");
+    if (!is_mode(mode) || strcmp(mode, "OPAQUE") == 0) return 0.0f;
+    if (!is_masked(material)) return 0.5f;
+    const double cutoff = cutoff_of(material);
+    return cutoff < look->opacity ? (float)(cutoff / look->opacity) : cutoff > 0.0 ? 1.0f : 0.0f;
+}
+
 static int keep_texture(struct gltf *g, const struct base *base, const json_t *material, const char *at,
                         struct gltf_look *look)
 {
@@ -288,7 +316,7 @@ static int keep_texture(struct gltf *g, const struct base *base, const json_t *m
     if (rc != SH_OK || texture == GLTF_NONE) return rc;
     rc = read_lay(g, info, at, look);
     if (rc == SH_OK && surface->texture == 0) {
-        surface->solid = solid_of(material);
+        surface->solid = solid_of(material, look);
         rc = add_texture(g, texture, &surface->texture);
     }
     look->has_texture = surface->texture != 0;
@@ -299,7 +327,7 @@ int gltf_look_open(struct gltf *g, const char *object, const json_t *primitive, 
 {
     uint32_t number;
     json_t *material = NULL;
-    *look = (struct gltf_look){0};
+    *look = (struct gltf_look){.opacity = 1.0};
     int rc = gltf_index(g, primitive, "material", at, &number);
     if (rc == SH_OK && number != GLTF_NONE) rc = gltf_object(g, "materials", number, &material);
     if (rc != SH_OK) return rc;
@@ -310,6 +338,7 @@ int gltf_look_open(struct gltf *g, const char *object, const json_t *primitive, 
     struct base base;
     if (gltf_is_by_shaders(material)) return SH_OK;
     rc = find_base(g, material, own.text, &base);
+    if (rc == SH_OK) rc = read_mask(g, &base, material, own.text, look);
     if (rc == SH_OK) rc = keep_colour(g, &base, own.text, &g->b->scene->surface[look->label]);
     if (rc == SH_OK) rc = keep_clear(g, &base, material, own.text, &g->b->scene->surface[look->label]);
     return rc == SH_OK && build_wants_textures(g->b) ? keep_texture(g, &base, material, own.text, look) : rc;

@@ -15,6 +15,8 @@ struct gltf_look {
     bool has_texture;
     uint32_t uv_set;
     double uv[2][3]; /* rows of the transform of texture coordinates */
+    double cutoff;   /* a point of less opacity is a hole; 0: the material has no such holes, or none are wanted */
+    double opacity;  /* of the whole surface: texture and vertices have a share of it */
 };
 /* Names all materials. Due once, before the first gltf_look_open. */
 int gltf_name_materials(struct gltf *g);

@@ -19,6 +19,13 @@ void gltf_apply(const gltf_matrix m, const double v[3], double out[3])
         out[i] = m[i][0] * x + m[i][1] * y + m[i][2] * z + m[i][3];
 }
 
+bool gltf_is_mirrored(const gltf_matrix m)
+{
+    return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+               m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]) <
+           0.0;
+}
+
 bool gltf_compose(const double t[3], const double r[4], const double s[3], gltf_matrix out)
 {
     const double n2 = r[0] * r[0] + r[1] * r[1] + r[2] * r[2] + r[3] * r[3];

@@ -3,6 +3,7 @@
  * added when a triangle first uses it, since primitives may share accessors that are much larger than themselves. */
 #include "core/import/gltf/gltf_mesh.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -21,6 +22,7 @@ struct part {
     struct gltf_pose pose;
     struct gltf_look look;
     struct gltf_view index, uv, colour; /* count GLTF_NONE: there is none */
+    bool has_alpha;                     /* colour has opacities */
     const double (*world)[4];
     uint32_t *vertex; /* [pose.position.count] 1 + its number in the scene; 0: not added yet */
 };
@@ -53,24 +55,71 @@ static void add_rgb(const struct part *p, uint32_t i, uint8_t out[4])
     build_rgb(p->g->b, rgb, 255.0, out);
 }
 
-/* corner has places in the list of indices; without that list, places in the list of vertices. */
+/* Finds the vertex of a corner: place `at` in the list of indices, or without that list, in the list of vertices. */
+static int find_vertex(const struct part *p, uint32_t at, uint32_t *vertex)
+{
+    const double number = p->index.count != GLTF_NONE ? gltf_value(&p->index, at, 0) : at;
+    if (number >= (double)p->pose.position.count)
+        return gltf_fail(p->g, "index %.0f out of range; there are %u vertices", number, p->pose.position.count);
+    *vertex = (uint32_t)number;
+    return SH_OK;
+}
+
+/* Sets corner c of the next triangle to vertex i. */
+static int take_corner(struct part *p, uint32_t i, int c)
+{
+    struct scene_build *b = p->g->b;
+    int rc = p->vertex[i] == 0 ? add_vertex(p, i) : SH_OK;
+    if (rc != SH_OK) return rc;
+    b->corner[c] = p->vertex[i] - 1;
+    if (b->has_uv) add_uv(p, i, b->corner_uv[c]);
+    if (b->has_rgb) add_rgb(p, i, b->corner_rgb[c]);
+    return SH_OK;
+}
+
+/* Whether a triangle is a hole all over: no point of it has more opacity than its corners. Other opacities of corners
+ * have no place in a scene. They are counted. */
+static bool is_hole(struct part *p, const uint32_t vertex[3])
+{
+    double most = 0.0, least = 1.0;
+    if (!(p->look.cutoff > 0.0)) return false;
+    for (int c = 0; c < 3; c++) {
+        const double alpha = p->has_alpha ? fmin(fmax(gltf_value(&p->colour, vertex[c], 3), 0.0), 1.0) : 1.0;
+        most = fmax(most, alpha);
+        least = fmin(least, alpha);
+    }
+    const bool is = most * p->look.opacity < p->look.cutoff;
+    if (is) p->g->n_holes++;
+    if (!is && least < 1.0 && (p->look.has_texture || least * p->look.opacity < p->look.cutoff)) p->g->n_faded++;
+    return is;
+}
+
+/* glTF 2.0, 3.7.4: where the transform's determinant is negative, the front is clockwise. build_polygon takes the front
+ * as counter-clockwise, so the triangle is turned over. Where joints disagree, those of two corners decide. */
+static bool is_turned_over(const struct part *p, const uint32_t vertex[3])
+{
+    int n = 0;
+    for (int c = 0; c < 3; c++)
+        n += gltf_pose_is_mirrored(&p->pose, p->world, vertex[c]);
+    return n >= 2;
+}
+
+/* corner has three places as find_vertex has them. */
 static int add_triangle(struct part *p, const uint32_t corner[3])
 {
     struct scene_build *b = p->g->b;
+    uint32_t vertex[3];
+    int rc = SH_OK;
     b->has_uv = p->uv.count != GLTF_NONE;
-    b->has_rgb = p->colour.count != GLTF_NONE;
-    for (int c = 0; c < 3; c++) {
-        const double at = p->index.count != GLTF_NONE ? gltf_value(&p->index, corner[c], 0) : corner[c];
-        if (at >= (double)p->pose.position.count)
-            return gltf_fail(p->g, "index %.0f out of range; there are %u vertices", at, p->pose.position.count);
-        const uint32_t i = (uint32_t)at;
-        int rc = p->vertex[i] == 0 ? add_vertex(p, i) : SH_OK;
-        if (rc != SH_OK) return rc;
-        b->corner[c] = p->vertex[i] - 1;
-        if (b->has_uv) add_uv(p, i, b->corner_uv[c]);
-        if (b->has_rgb) add_rgb(p, i, b->corner_rgb[c]);
-    }
-    int rc = build_polygon(b, 3, p->look.label, p->g->err);
+    b->has_rgb = p->colour.count != GLTF_NONE && build_wants_colours(b);
+    for (int c = 0; c < 3 && rc == SH_OK; c++)
+        rc = find_vertex(p, corner[c], &vertex[c]);
+    if (rc != SH_OK || is_hole(p, vertex)) return rc;
+    for (int c = 0; c < 3 && rc == SH_OK; c++)
+        rc = take_corner(p, vertex[c], c);
+    if (rc != SH_OK) return rc;
+    if (is_turned_over(p, vertex)) build_turn_over(b, 3);
+    rc = build_polygon(b, 3, p->look.label, p->g->err);
     if (rc == SH_OK && (p->g->n_done++ & 0xffff) == 0)
         rc = build_progress(b, (double)p->g->n_drawn / ((double)p->g->n_nodes + 1.0), p->g->err);
     return rc;
@@ -147,13 +196,14 @@ static int open_colour(struct part *p, const json_t *attributes, const char *at)
     uint32_t accessor;
     json_t *of = NULL;
     p->colour.count = GLTF_NONE;
-    if (!build_wants_colours(p->g->b)) return SH_OK;
+    if (!build_wants_colours(p->g->b) && !(p->look.cutoff > 0.0)) return SH_OK;
     int rc = gltf_index(p->g, attributes, "COLOR_0", at, &accessor);
     if (rc != SH_OK || accessor == GLTF_NONE) return rc;
     rc = gltf_object(p->g, "accessors", accessor, &of);
     if (rc != SH_OK) return rc;
     const char *type = gltf_text(of, "type");
-    rc = gltf_view_open(p->g, accessor, type != NULL && strcmp(type, "VEC3") == 0 ? "VEC3" : "VEC4", &p->colour);
+    p->has_alpha = type == NULL || strcmp(type, "VEC3") != 0;
+    rc = gltf_view_open(p->g, accessor, p->has_alpha ? "VEC4" : "VEC3", &p->colour);
     if (rc == SH_OK && p->colour.count < p->pose.position.count)
         rc = gltf_fail(p->g, "%s: %u colours for %u vertices", at, p->colour.count, p->pose.position.count);
     return rc;

@@ -161,11 +161,6 @@ static int draw_node(struct gltf *g, uint32_t i, const json_t *node)
     return instancing != NULL ? add_instances(g, i, name, instancing) : gltf_add_mesh(g, i, name, g->node[i].world);
 }
 
-static bool is_hidden(const json_t *node)
-{
-    return json_is_false(json_object_get(gltf_extension(node, "KHR_node_visibility"), "visible"));
-}
-
 /* Draws a node's own mesh first, then its children in their order. Nodes below a hidden one are hidden. */
 static int draw_tree(struct gltf *g, const json_t *nodes, uint32_t root)
 {
@@ -177,7 +172,7 @@ static int draw_tree(struct gltf *g, const json_t *nodes, uint32_t root)
         const json_t *node = json_array_get(nodes, i), *children = json_object_get(node, "children");
         g->node[i].is_drawn = true;
         g->n_drawn++;
-        if (is_hidden(node)) {
+        if (gltf_is_hidden(node)) {
             g->n_hidden++;
             continue;
         }

@@ -84,6 +84,7 @@ static int take_joint(struct gltf *g, const json_t *joints, uint32_t i, const st
     const struct gltf_node *joint = &g->node[node];
     gltf_multiply(joint->world, bind, pose->joint[i]);
     take_reach(joint->world, bind, pose->reach[i]);
+    pose->has_mirrored = pose->has_mirrored || gltf_is_mirrored(pose->joint[i]);
     return SH_OK;
 }
 
@@ -215,6 +216,21 @@ int gltf_pose_vertex(struct gltf *g, struct gltf_pose *pose, uint32_t i, double 
 {
     morph(pose, i, out);
     return pose->joint != NULL ? bend(g, pose, i, out) : SH_OK;
+}
+
+/* A vertex that no joint moves is not mirrored. bend() has checked the numbers of joints whose weight is not 0. */
+bool gltf_pose_is_mirrored(const struct gltf_pose *pose, const gltf_matrix world, uint32_t i)
+{
+    double most = 0.0;
+    bool is_mirrored = false;
+    if (pose->joint == NULL) return gltf_is_mirrored(world);
+    for (uint32_t s = 0; s < 4 * pose->n_sets && pose->has_mirrored; s++) {
+        const double weight = gltf_value(&pose->weights[s / 4], i, s % 4);
+        if (!(weight > most)) continue;
+        most = weight;
+        is_mirrored = gltf_is_mirrored(pose->joint[(uint32_t)gltf_value(&pose->joints[s / 4], i, s % 4)]);
+    }
+    return is_mirrored;
 }
 
 /* ---- their error */

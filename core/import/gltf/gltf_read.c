@@ -18,10 +18,27 @@ bool gltf_is_name(const char *file)
     return text_has_ending(file, ".gltf") || text_has_ending(file, ".glb");
 }
 
+/* Counts names with a NUL, which end there for everyone who reads them. */
+static unsigned count_cut_names(const struct gltf *g)
+{
+    static const char *const list[] = {"nodes", "meshes", "materials"};
+    unsigned n = 0;
+    for (size_t i = 0; i < sizeof list / sizeof list[0]; i++) {
+        const json_t *all = json_object_get(g->root, list[i]);
+        for (size_t k = 0; k < json_array_size(all); k++) {
+            const json_t *name = json_object_get(json_array_get(all, k), "name");
+            n += json_is_string(name) && strlen(json_string_value(name)) != json_string_length(name);
+        }
+    }
+    return n;
+}
+
 /* Warns of what was left out or changed, one line for each kind. */
 static void say_counts(const struct gltf *g)
 {
+    const unsigned n_cut = count_cut_names(g);
     gltf_say_indices(g->b, g->root);
+    if (n_cut > 0) build_warn(g->b, "%u names have a \\u0000, and are read up to there", n_cut);
     if (g->n_hidden > 0)
         build_warn(g->b, "%u nodes are hidden (KHR_node_visibility); they and their children are left out",
                    g->n_hidden);
@@ -33,6 +50,14 @@ static void say_counts(const struct gltf *g)
     if (g->n_unweighted > 0)
         build_warn(g->b, "%llu vertices of a skin have no weights: no joint moves them",
                    (unsigned long long)g->n_unweighted);
+    if (g->n_holes > 0)
+        build_warn(g->b, "%llu triangles left out: they have less opacity than their material's alphaCutoff (MASK)",
+                   (unsigned long long)g->n_holes);
+    if (g->n_faded > 0)
+        build_warn(g->b,
+                   "%llu triangles of masked materials have opacities of their corners (COLOR_0): they are read "
+                   "without holes by these",
+                   (unsigned long long)g->n_faded);
     if (g->n_images > 0)
         build_warn(g->b, "%u primitives have a texture of %s, which is not supported: their surfaces have no texture",
                    g->n_images, g->image);

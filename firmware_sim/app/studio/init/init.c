@@ -4,12 +4,14 @@
 #include <fcntl.h>
 #include <libgen.h>
 #include <limits.h>
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
 #include "core/angle.h"
 #include "core/newfile.h"
+#include "core/text.h"
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/studio/init/mesh.h"
 #include "firmware_sim/app/studio/init/text.h"
@@ -63,6 +65,16 @@ static int find_place(const struct init_run *run, const struct scene *scene, str
 
 /* ---- the file */
 
+static bool is_utf8(const char *text)
+{
+    while (*text != '\0') {
+        const int n = text_utf8_len(text, 4);
+        if (n == 0) return false;
+        text += n;
+    }
+    return true;
+}
+
 /* Finds the mesh's path from the configuration's folder; where the two share only the root, its absolute path. */
 static int find_path(const struct init_run *run, char path[CONFIG_PATH_LEN], struct sh_err *err)
 {
@@ -70,6 +82,9 @@ static int find_path(const struct init_run *run, char path[CONFIG_PATH_LEN], str
     snprintf(folder, sizeof folder, "%s", run->output);
     if (realpath(run->wish.file, mesh) == NULL)
         return sh_fail(err, SH_EINPUT, "%s: %s", run->wish.file, strerror(errno));
+    if (!is_utf8(mesh))
+        return sh_fail(err, SH_EINPUT, "%s: its path is not UTF-8, so YAML can't name it; allowed is UTF-8: rename it",
+                       run->name);
     if (realpath(dirname(folder), from) == NULL) return sh_fail(err, SH_EINPUT, "%s: %s", folder, strerror(errno));
     size_t same = 0, used = 0;
     for (size_t i = 0; mesh[i] == from[i] || (from[i] == '\0' && mesh[i] == '/'); i++) {

@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "core/angle.h"
+#include "firmware_sim/config/escape.h"
 #include "firmware_sim/config/profile.h"
 #include "firmware_sim/site/site.h"
 
@@ -76,19 +77,20 @@ void init_describe(const struct viewpoint *at, char *buf, size_t len)
         snprintf(buf, len, "outside, facing the mesh");
 }
 
+static void put_escaped(const char *text, FILE *out)
+{
+    char one[CONFIG_ESCAPE_ROOM];
+    for (const char *p = text; *p != '\0';) {
+        p += config_escape(p, one);
+        fputs(one, out);
+    }
+}
+
 /* A double-quoted scalar of YAML. */
 static void put_quoted(const char *text, FILE *out)
 {
     fputc('"', out);
-    for (const char *p = text; *p != '\0'; p++) {
-        unsigned char c = (unsigned char)*p;
-        if (c == '"' || c == '\\')
-            fprintf(out, "\\%c", c);
-        else if (c < 0x20 || c == 0x7f)
-            fprintf(out, "\\x%02x", c);
-        else
-            fputc(c, out);
-    }
+    put_escaped(text, out);
     fputc('"', out);
 }
 
@@ -146,8 +148,10 @@ static void put_station(const struct init_text *t, FILE *out)
 void init_write_text(const struct init_text *t, FILE *out)
 {
     const struct scene *s = t->scene;
-    fprintf(out, "# %s: %.4g x %.4g x %.4g m, %u triangles. Change what does not fit.\n", t->mesh_name,
-            s->max_m[0] - s->min_m[0], s->max_m[1] - s->min_m[1], s->max_m[2] - s->min_m[2], s->n_triangles);
+    fputs("# ", out);
+    put_escaped(t->mesh_name, out); /* a line end of YAML would end the comment */
+    fprintf(out, ": %.4g x %.4g x %.4g m, %u triangles. Change what does not fit.\n", s->max_m[0] - s->min_m[0],
+            s->max_m[1] - s->min_m[1], s->max_m[2] - s->min_m[2], s->n_triangles);
     text_put_head(t, out);
     put_scene(t, out);
     put_clear(s, out);
