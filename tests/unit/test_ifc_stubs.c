@@ -125,6 +125,30 @@ static void one_reader_may_fail(void **state)
     }
 }
 
+/* Descriptor 5 has the file's size, and a line for each change: here the list of representations of a wall that also
+ * has a clearance. */
+static void readers_get_the_changes(void **state)
+{
+    (void)state;
+    static const char *const rows[] = {"([0-9]+)\\n$", "([0-9]+)\\n[0-9]+ 11 #1001\\n$"};
+    static const char more[] = "#7000=IFCSHAPEREPRESENTATION(#13,'Clearance','SolidModel',(#1060));\n"
+                               "#7001=IFCPRODUCTDEFINITIONSHAPE($,$,(#7000,#1001));\n"
+                               "#7002=IFCWALL('guid_of_wall',#5,'wall',$,$,#1003,#7001,$,$);\n";
+    needs_node();
+    for (int i = 0; i < 2; i++) {
+        char program[2048];
+        snprintf(program, sizeof program,
+                 ONE END "const is = /^%s/.exec(fs.readFileSync(5, 'latin1'))\n"
+                         "if (!is || Number(is[1]) !== fs.statSync(process.argv[2]).size) process.exit(3)\n",
+                 rows[i]);
+        ifc_write_text(text, "IFC4", NULL, NULL, ifc_shapes, 1, i == 1 ? more : NULL);
+        make_stubs(program, program);
+        must_read(1e-3);
+        assert_null(strstr(warnings, "not cross-checked"));
+        scene_free(scene);
+    }
+}
+
 /* A product's object is its type, name and GlobalId, in up to 255 bytes. "IFCBUILDINGELEMENTPROXY_" and
  * "_guid_of_product__00000" take 47, so the name has 208. A longer one is cut between two letters, and counted. */
 static void long_names_are_cut_between_letters(void **state)
@@ -243,6 +267,7 @@ int main(void)
         cmocka_unit_test(one_reader_may_fail),         cmocka_unit_test(missing_unit_is_said),
         cmocka_unit_test(facets_of_ifc_lite_are_said), cmocka_unit_test(reader_that_hangs_is_ended),
         cmocka_unit_test(without_node_assimp_reads),   cmocka_unit_test(long_names_are_cut_between_letters),
+        cmocka_unit_test(readers_get_the_changes),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_all);
 }

@@ -182,14 +182,19 @@ static int check_number(struct reading *r)
 static int read_by_two(struct reading *r)
 {
     const struct ifc_fineness fineness = fineness_for(&r->records, r->b->tolerance_m);
+    size_t n_edits;
     int rc = check_number(r);
     if (rc != SH_OK) return rc;
     build_announce(r->b);
-    rc = ifc_run_readers(r->b, fineness, &r->readings, r->err);
+    char *edits = ifc_edits_write(&r->records.edits, &r->records.index.text, &n_edits);
+    if (edits == NULL) return ifc_no_memory(&r->records.index, r->err);
+    rc = ifc_run_readers(r->b, fineness, (struct text_span){edits, n_edits}, &r->readings, r->err);
+    free(edits);
     if (rc == SH_OK) rc = say_missing(r, "web-ifc", &r->readings.web_said);
     if (rc == SH_OK) rc = say_missing(r, "ifc-lite", &r->readings.lite_said);
     if (rc == SH_OK) rc = add_products(r);
     if (rc == SH_OK) rc = say_facets(r, &fineness);
+    if (rc == SH_OK) ifc_say_levels(r->b, r->records.product, r->records.n_products);
     if (rc == SH_OK) ifc_say_coarse(r->b, r->records.product, r->records.n_products);
     if (rc == SH_OK)
         rc = ifc_say_findings(r->b, r->records.product, r->records.n_products, r->limits.ifc_strict, r->err);

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/grow.h"
+#include "core/import/ifc/ifc_shapes.h"
 #include "core/import/ifc/ifc_styles.h"
 #include "core/import/ifc/ifc_text.h"
 #include "core/import/ifc/ifc_unit.h"
@@ -85,6 +86,7 @@ int ifc_records_open(struct ifc_records *r, const char *path, struct sh_err *err
     if (r->mark == NULL) return ifc_no_memory(&r->index, err);
     for (size_t i = 0; i < r->index.n && rc == SH_OK; i++)
         rc = add_product(r, &r->index.record[i], err);
+    if (rc == SH_OK) rc = ifc_shapes_choose(&r->index, r->product, r->n_products, &r->edits, err);
     if (rc == SH_OK) rc = ifc_styles_collect(r, err);
     return rc == SH_OK ? ifc_walk(r, err) : rc;
 }
@@ -102,5 +104,6 @@ void ifc_records_close(struct ifc_records *r)
     for (size_t i = 0; i < r->n_styles; i++)
         free(r->style[i].name);
     free(r->style);
+    ifc_edits_free(&r->edits);
     ifc_index_close(&r->index);
 }
