@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The representations of products in IFC files: which of them are the body, and what the readers of bodies get. No
- * reader of bodies is needed. */
+/* The representations of products in IFC files: which of them are the body, and what the readers of bodies get, of
+ * points with an index too. No reader of bodies is needed. */
 #include "core/import/ifc/ifc_records.h"
 #include "tests/unit/ifc_files.h"
 #include "tests/unit/scene_files.h"
@@ -167,11 +167,103 @@ static void marks_are_those_of_the_body(void **state)
     ifc_records_close(&records);
 }
 
+/* More records: the file ends with them. */
+static void add_records(const char *more)
+{
+    ifc_write_text(text, "IFC4", NULL, NULL, ifc_shapes, 1, more);
+}
+
+static void has_edited(const char *want)
+{
+    open_text();
+    apply_edits();
+    if (strstr(edited, want) == NULL) fail_msg("no %s in %s", want, strstr(edited, "#7000"));
+    ifc_records_close(&records);
+}
+
+/* IFC4 ADD2: an index of a triangle is a place in PnIndex, and that gives a place in the list of points. The largest
+ * number of a record is 7002 here. */
+static void indexed_points_become_a_list(void **state)
+{
+    (void)state;
+#define LIST(more) "#7000=IFCCARTESIANPOINTLIST3D(((0.,0.,0.),\r\n (1.,0.,0.) ,(0.,1.,\n0.),(0.,0.,7.))" more ");\n"
+    add_records(LIST("") "#7001=IFCTRIANGULATEDFACESET( #7000 ,$,.F.,((1,2,3)),( 4,1 ,\n3));\n#7002=IFCWALL();\n");
+    has_edited("#7003=IFCCARTESIANPOINTLIST3D(((0.,0.,7.),(0.,0.,0.),(0.,1., 0.)));"
+               "#7001=IFCTRIANGULATEDFACESET( #7003 ,$,.F.,((1,2,3)),$);\n");
+    add_records(
+        LIST(",$") "#7001=IFCPOLYGONALFACESET(#7000,.F.,(#7002),(2));\n#7002=IFCINDEXEDPOLYGONALFACE((1,1,1));\n");
+    has_edited("#7003=IFCCARTESIANPOINTLIST3D(((1.,0.,0.)),$);#7001=IFCPOLYGONALFACESET(#7003,.F.,(#7002),$);\n");
+    /* Two face sets share a list. */
+    add_records(LIST("") "#7001=IFCTRIANGULATEDFACESET(#7000,$,$,((1,1,1)),(1));\n"
+                         "#7002=IFCTRIANGULATEDFACESET(#7000,$,$,((1,1,1)),(4));\n");
+    has_edited("#7003=IFCCARTESIANPOINTLIST3D(((0.,0.,0.)));#7001=IFCTRIANGULATEDFACESET(#7003,$,$,((1,1,1)),$);\n"
+               "#7004=IFCCARTESIANPOINTLIST3D(((0.,0.,7.)));#7002=IFCTRIANGULATEDFACESET(#7004,$,$,((1,1,1)),$);\n");
+    /* These have no index of points: none at all, an empty one, and the first edition's index of normals. */
+    static const char *const plain[] = {"$", "()", "((1,2,3))"};
+    for (size_t i = 0; i < sizeof plain / sizeof plain[0]; i++) {
+        char more[512];
+        snprintf(more, sizeof more, LIST("") "#7001=IFCTRIANGULATEDFACESET(#7000,$,.F.,((1,2,3)),%s);\n", plain[i]);
+        add_records(more);
+        open_text();
+        assert_int_equal(records.edits.n, 0);
+        ifc_records_close(&records);
+    }
+}
+
+static void index_without_a_point_is_refused(void **state)
+{
+    (void)state;
+    static const char *const wrong[] = {"5", "0", "-1", "x", "1.5"};
+    for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        char more[512], want[128];
+        snprintf(more, sizeof more, LIST("") "#7001=IFCTRIANGULATEDFACESET(#7000,$,.F.,((1,2,3)),(1,2,%s));\n",
+                 wrong[i]);
+        snprintf(want, sizeof want,
+                 "IFCTRIANGULATEDFACESET #7001: PnIndex has %s; allowed 1 to 4, the number of points of #7000",
+                 wrong[i]);
+        add_records(more);
+        assert_int_equal(ifc_records_open(&records, write_text("a.ifc", text), &err), SH_EINPUT);
+        if (strstr(err.text, want) == NULL) fail_msg("%s", err.text);
+        ifc_records_close(&records);
+        unlink(path);
+    }
+    add_records("#7001=IFCTRIANGULATEDFACESET(#9,$,.F.,((1,2,3)),(1,2,3));\n");
+    assert_int_equal(ifc_records_open(&records, write_text("a.ifc", text), &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "its Coordinates are no IFCCARTESIANPOINTLIST3D"));
+    ifc_records_close(&records);
+    unlink(path);
+}
+
+/* IFC 4.3: -2 is a void, -1 a hole, and breaklines are 0 and above. Triangles without a flag stay. */
+static void holes_of_a_network_are_left_out(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *flags, *left;
+    } rows[] = {{"(0,-2,7)", "((1,2,3),(1,4,2))"},
+                {"( -1, 0\n,-2)", "((1,3,4))"},
+                {"(0,1,2)", "((1,2,3), (1,3,4) ,(1,4,2))"},
+                {"(-1)", "((1,3,4),(1,4,2))"},
+                {"$", "((1,2,3), (1,3,4) ,(1,4,2))"}};
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        char more[512], want[128];
+        snprintf(more, sizeof more,
+                 LIST("") "#7001=IFCTRIANGULATEDIRREGULARNETWORK(#7000,$,.F.,((1,2,3), (1,3,4) ,(1,4,2)),$,%s);\n",
+                 rows[i].flags);
+        snprintf(want, sizeof want, "(#7000,$,.F.,%s,$,", rows[i].left);
+        add_records(more);
+        has_edited(want);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(bodies_are_chosen),
         cmocka_unit_test(marks_are_those_of_the_body),
+        cmocka_unit_test(indexed_points_become_a_list),
+        cmocka_unit_test(index_without_a_point_is_refused),
+        cmocka_unit_test(holes_of_a_network_are_left_out),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -13,6 +13,9 @@ bool ifc_edits_add(struct ifc_edits *e, const struct text *t, struct text_span p
         free(text);
         return false;
     }
+    /* What comes from the file may go over several lines, a change may not. */
+    for (char *p = text; (p = strpbrk(p, "\r\n")) != NULL;)
+        *p = ' ';
     e->edit[e->n++] = (struct ifc_edit){.at = (size_t)(part.p - t->data), .n = part.n, .text = text};
     return true;
 }
@@ -24,10 +27,8 @@ bool ifc_edits_keep(struct ifc_edits *e, struct text *t, struct text_span list, 
     size_t len = 0;
     for (size_t i = 0; i < n && text != NULL; i++) {
         if (i > 0) text[len++] = ',';
-        for (size_t k = 0; k < kept[i].n; k++) { /* an element may go over several lines, a change may not */
-            const char c = kept[i].p[k];
-            text[len++] = c == '\n' || c == '\r' ? ' ' : c;
-        }
+        memcpy(text + len, kept[i].p, kept[i].n);
+        len += kept[i].n;
     }
     if (!ifc_edits_add(e, t, list, text)) return false;
     char *at = t->data + (list.p - t->data);

@@ -21,7 +21,7 @@ struct ifc_edits {
 };
 
 /* Replaces part of a file's text, without a change of t->data. `text` is from malloc, and becomes the edits' in any
- * case; NULL counts as no memory. false: there is no memory. */
+ * case; line ends in it become blanks. NULL counts as no memory. false: there is no memory. */
 bool ifc_edits_add(struct ifc_edits *e, const struct text *t, struct text_span part, char *text);
 
 /* Keeps n elements of a list (span: without its brackets), in the file and in t->data, where blanks follow. false:

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/grow.h"
+#include "core/import/ifc/ifc_points.h"
 #include "core/import/ifc/ifc_shapes.h"
 #include "core/import/ifc/ifc_styles.h"
 #include "core/import/ifc/ifc_text.h"
@@ -87,6 +88,7 @@ int ifc_records_open(struct ifc_records *r, const char *path, struct sh_err *err
     for (size_t i = 0; i < r->index.n && rc == SH_OK; i++)
         rc = add_product(r, &r->index.record[i], err);
     if (rc == SH_OK) rc = ifc_shapes_choose(&r->index, r->product, r->n_products, &r->edits, err);
+    if (rc == SH_OK) rc = ifc_points_resolve(&r->index, &r->edits, err);
     if (rc == SH_OK) rc = ifc_styles_collect(r, err);
     return rc == SH_OK ? ifc_walk(r, err) : rc;
 }
