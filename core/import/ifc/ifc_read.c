@@ -145,6 +145,14 @@ static int say_missing(struct reading *r, const char *name, const struct sh_err 
     return SH_OK;
 }
 
+/* The products are named by their findings, since the reader has no body for them. */
+static void say_wrong(struct reading *r, const char *name, const struct ifc_bodies *bodies)
+{
+    if (bodies->n_wrong == 0) return;
+    build_warn(r->b, "%s makes %zu bod%s with a wrong number, NaN for example: %s not used", name, bodies->n_wrong,
+               bodies->n_wrong > 1 ? "ies" : "y", bodies->n_wrong > 1 ? "they are" : "it is");
+}
+
 /* A circle gets at most MOST_SEGMENTS sides. A file's largest circle may need more sides to stay within the
  * tolerance. */
 static int say_facets(struct reading *r, const struct ifc_fineness *fineness)
@@ -192,6 +200,8 @@ static int read_by_two(struct reading *r)
     free(edits);
     if (rc == SH_OK) rc = say_missing(r, "web-ifc", &r->readings.web_said);
     if (rc == SH_OK) rc = say_missing(r, "ifc-lite", &r->readings.lite_said);
+    say_wrong(r, "web-ifc", &r->readings.web);
+    say_wrong(r, "ifc-lite", &r->readings.lite);
     if (rc == SH_OK) rc = add_products(r);
     if (rc == SH_OK) rc = say_facets(r, &fineness);
     if (rc == SH_OK) ifc_say_levels(r->b, r->records.product, r->records.n_products);
