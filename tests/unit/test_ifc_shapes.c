@@ -167,6 +167,28 @@ static void marks_are_those_of_the_body(void **state)
     ifc_records_close(&records);
 }
 
+/* An analysis model has the shapes of the building a second time, and loads. */
+static void analysis_models_are_marked(void **state)
+{
+    (void)state;
+    static const char *const types[] = {"IFCWALL",
+                                        "IFCSTRUCTURALSURFACEMEMBER",
+                                        "IFCSTRUCTURALSURFACEMEMBERVARYING",
+                                        "IFCSTRUCTURALSURFACECONNECTION",
+                                        "IFCSTRUCTURALSURFACEACTION",
+                                        "IFCSTRUCTURALPLANARACTION",
+                                        "IFCSTRUCTURALCURVEMEMBER"};
+    for (size_t i = 0; i < sizeof types / sizeof types[0]; i++) {
+        char more[256];
+        snprintf(more, sizeof more, "#7000=%s('guid_of_it',#5,'it',$,$,#1003,#1002,.SHELL.,0.2);\n", types[i]);
+        ifc_write_text(text, "IFC4", NULL, NULL, ifc_shapes, 1, more);
+        open_text();
+        const struct ifc_product *p = ifc_records_product(&records, 7000);
+        assert_true(p->is_analysis == (i > 0) && p->is_air == (i > 0) && p->has_body);
+        ifc_records_close(&records);
+    }
+}
+
 /* More records: the file ends with them. */
 static void add_records(const char *more)
 {
@@ -261,6 +283,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(bodies_are_chosen),
         cmocka_unit_test(marks_are_those_of_the_body),
+        cmocka_unit_test(analysis_models_are_marked),
         cmocka_unit_test(indexed_points_become_a_list),
         cmocka_unit_test(index_without_a_point_is_refused),
         cmocka_unit_test(holes_of_a_network_are_left_out),

@@ -100,6 +100,7 @@ static const struct {
     [IFC_CLOSED_LITE] = {"web-ifc leaves the body open: the closed body of ifc-lite is used", true},
     [IFC_OPEN] = {"the body is open", false},
     [IFC_FAILED] = {"the reader says that parts of the body failed", true},
+    [IFC_ANALYSIS] = {"part of an analysis model, not of the building, so it is not in the scene", false},
     [IFC_UNCUT] = {"no IfcRelVoidsElement says what it opens, so it opens nothing", true},
 };
 

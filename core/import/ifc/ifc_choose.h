@@ -23,6 +23,7 @@ enum ifc_finding {
     IFC_CLOSED_LITE, /* likewise */
     IFC_OPEN,        /* both make the same, or one was run; the body is open */
     IFC_FAILED,      /* the reader whose body is taken reports a failure */
+    IFC_ANALYSIS,    /* its surfaces are those of an analysis model */
     IFC_UNCUT,       /* the records have an opening that cuts nothing */
     IFC_FINDINGS,
 };

@@ -119,6 +119,7 @@ static int add_products(struct reading *r)
     for (size_t i = 0; i < r->records.n_products && rc == SH_OK; i++) {
         struct ifc_product *p = &r->records.product[i];
         if (p->opens_nothing) p->finding = IFC_UNCUT;
+        if (p->is_analysis && p->has_body) p->finding = IFC_ANALYSIS;
         if (p->is_air) continue;
         const struct ifc_body *web = with_parts(&in->web, in->has_web, p->id),
                               *lite = with_parts(&in->lite, in->has_lite, p->id);

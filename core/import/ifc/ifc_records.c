@@ -21,6 +21,14 @@ const struct ifc_product *ifc_records_product(const struct ifc_records *r, uint6
     return r->n_products > 0 ? bsearch(&id, r->product, r->n_products, sizeof *r->product, ifc_compare) : NULL;
 }
 
+/* Members, connections and loads of an analysis model, IfcStructuralItem and IfcStructuralActivity: the building's own
+ * walls and slabs stand in the same places. */
+static bool is_analysis(struct text_span type)
+{
+    static const char start[] = "IFCSTRUCTURAL";
+    return type.n >= sizeof start - 1 && memcmp(type.p, start, sizeof start - 1) == 0;
+}
+
 /* Types without a surface: air, drawings, and connections. */
 static bool is_air(struct text_span type)
 {
@@ -72,7 +80,8 @@ static int add_product(struct ifc_records *r, const struct step_record *record, 
                               .guid = ifc_text(arg[PRODUCT_GUID]),
                               .name = ifc_text(arg[PRODUCT_NAME]),
                               .shape = shape,
-                              .is_air = is_air(record->type)};
+                              .is_analysis = is_analysis(record->type),
+                              .is_air = is_air(record->type) || is_analysis(record->type)};
     if (p->guid == NULL || p->name == NULL) return ifc_no_memory(&r->index, err);
     return check_placement(r, p, arg[PRODUCT_PLACEMENT], err);
 }
