@@ -2,6 +2,7 @@
 /* IFC where a reader fails, waits for ever or isn't there: one-line programs take the place of the two readers, and
  * their failures are reported. The tests that need node are skipped where it is not installed. */
 #include <math.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <time.h>
 
@@ -149,6 +150,26 @@ static void readers_get_the_changes(void **state)
     }
 }
 
+/* Under `ulimit -v` the file may be a good one, so no advice says to export it again. No process reaches this limit. */
+static void limit_of_addresses_is_named(void **state)
+{
+    (void)state;
+    struct rlimit was, limit;
+    needs_node();
+    assert_int_equal(getrlimit(RLIMIT_AS, &was), 0);
+    if (was.rlim_max != RLIM_INFINITY) skip();
+    limit = (struct rlimit){.rlim_cur = (rlim_t)1 << 52, .rlim_max = was.rlim_max};
+    ifc_write_text(text, "IFC4", NULL, NULL, ifc_shapes, 1, NULL);
+    make_stubs("process.exit(3)", "process.exit(3)");
+    assert_int_equal(setrlimit(RLIMIT_AS, &limit), 0);
+    const int rc = read_text(1e-3);
+    assert_int_equal(setrlimit(RLIMIT_AS, &was), 0);
+    assert_int_equal(rc, SH_EINPUT);
+    const char *last = strstr(err.text, "ifc-lite ended without a message; `ulimit -v` leaves it 4294967296 MiB");
+    if (last == NULL || strstr(err.text, "export") != NULL) fail_msg("%s", err.text);
+    assert_string_equal(err.text + strlen(err.text) - 16, " lift that limit");
+}
+
 /* A product's object is its type, name and GlobalId, in up to 255 bytes. "IFCBUILDINGELEMENTPROXY_" and
  * "_guid_of_product__00000" take 47, so the name has 208. A longer one is cut between two letters, and counted. */
 static void long_names_are_cut_between_letters(void **state)
@@ -267,7 +288,7 @@ int main(void)
         cmocka_unit_test(one_reader_may_fail),         cmocka_unit_test(missing_unit_is_said),
         cmocka_unit_test(facets_of_ifc_lite_are_said), cmocka_unit_test(reader_that_hangs_is_ended),
         cmocka_unit_test(without_node_assimp_reads),   cmocka_unit_test(long_names_are_cut_between_letters),
-        cmocka_unit_test(readers_get_the_changes),
+        cmocka_unit_test(readers_get_the_changes),     cmocka_unit_test(limit_of_addresses_is_named),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_all);
 }

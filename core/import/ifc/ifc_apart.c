@@ -107,8 +107,9 @@ static int ifc_apart_judge(struct scene_build *b, const struct ifc_readings *out
     char web[IFC_REASON_LEN] = "", lite[IFC_REASON_LEN] = "";
     if (out->web_said.code != 0) ifc_reason(b, "web-ifc", &out->web_said, web);
     if (out->lite_said.code != 0) ifc_reason(b, "ifc-lite", &out->lite_said, lite);
-    return sh_fail(err, SH_EINPUT, "%s: no reader can read it: %s%s%s: " IMPORT_ELSE_CONVERT, b->name, web,
-                   *web != '\0' && *lite != '\0' ? "; " : "", lite);
+    const bool is_limited = strstr(web, IMPORT_USER_LIMIT) != NULL || strstr(lite, IMPORT_USER_LIMIT) != NULL;
+    return sh_fail(err, SH_EINPUT, "%s: no reader can read it: %s%s%s%s", b->name, web,
+                   *web != '\0' && *lite != '\0' ? "; " : "", lite, is_limited ? "" : ": " IMPORT_ELSE_CONVERT);
 }
 
 int ifc_run_readers(struct scene_build *b, struct ifc_fineness fineness, struct text_span edits,
