@@ -157,6 +157,7 @@ static int read_scene(const struct import_task *task, struct sh_err *err)
     if (rc != SH_OK) return rc;
     own.start_ns = task->b->start_ns;
     build_begin_file(&own, task->b->spec);
+    own.instead = task->b->instead;
     rc = task->read(&own, err);
     if (rc == SH_OK) rc = build_end_file(&own, err);
     return rc == SH_OK ? import_result_write(own.scene, RESULT_FD, err) : rc;

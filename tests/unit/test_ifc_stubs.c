@@ -277,6 +277,16 @@ static void without_node_assimp_reads(void **state)
     must_read(1e-3);
     if (strstr(warnings, "'half space, far' guid_of_product__00000") == NULL) fail_msg("%s", warnings);
     scene_free(scene);
+    /* A profile is no body. Assimp by itself takes the first. */
+    ifc_write_text(text, "IFC2X3", NULL, NULL, ifc_shapes, 1,
+                   "#7000=IFCEXTRUDEDAREASOLID(#7001,#12,#10,9.);\n#7001=IFCRECTANGLEPROFILEDEF(.AREA.,$,#17,9.,9.);\n"
+                   "#7002=IFCSHAPEREPRESENTATION(#13,'Profile','SolidModel',(#7000));\n"
+                   "#7003=IFCPRODUCTDEFINITIONSHAPE($,$,(#7002,#1001));\n"
+                   "#7004=IFCWALL('guid_of_wall_000000000',#5,'wall',$,$,#1003,#7003,$);\n"
+                   "#7005=IFCRELCONTAINEDINSPATIALSTRUCTURE('guid_of_relation_00009',#5,$,$,(#7004),#20);\n");
+    must_read(1e-3);
+    if (!(fabs(total_area(scene) - 2 * 28) < 1e-4)) fail_msg("%g m2", total_area(scene));
+    scene_free(scene);
     limits.ifc_reader = IFC_READER_WEB;
     assert_int_equal(read_text(1e-3), SH_EINPUT);
     setenv("PATH", had, 1);

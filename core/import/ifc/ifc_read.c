@@ -221,7 +221,14 @@ static int read_by_assimp(struct reading *r, const char *why)
                           "%s, so nothing is cross-checked, but scene.ifc_strict demands both readers", why);
     if (!asked) build_warn(r->b, "%s: Assimp reads it", why);
     const int rc = ifc_say_assimp(r->b, r->records.product, r->records.n_products, !asked, why, r->err);
-    return rc == SH_OK ? import_apart(r->b, r->err) : rc;
+    if (rc != SH_OK) return rc;
+    /* The records' text lacks the representations that are no body. */
+    if (r->records.edits.n > 0)
+        r->b->instead = (struct text_span){r->records.index.text.data, r->records.index.text.size};
+    const int read = import_apart(r->b, r->err);
+    r->b->instead = (struct text_span){NULL, 0};
+    if (read == SH_OK) ifc_say_levels(r->b, r->records.product, r->records.n_products);
+    return read;
 }
 
 /* Warns of an unknown unit: readers mostly take it for metres. */
