@@ -44,9 +44,9 @@ struct ifc_bodies {
     size_t n_wrong; /* bodies that are left out since one of their numbers is wrong */
 };
 
-/* Nothing in the file is trusted: SH_EINPUT says what is wrong with its form. A wrong number (a coordinate beyond 1e9 m or
- * NaN, a colour that is NaN, a corner that is no vertex) takes its body away, not the others. ifc_bodies_free is due in
- * any case. */
+/* Nothing in the file is trusted: SH_EINPUT says what is wrong with its form. A wrong number (a coordinate beyond 1e9 m
+ * or NaN, a colour that is NaN, a corner that is no vertex) takes its body away, not the others. ifc_bodies_free is due
+ * in any case. */
 int ifc_bodies_read(struct ifc_bodies *b, int fd, struct sh_err *err);
 void ifc_bodies_free(struct ifc_bodies *b);
 const struct ifc_body *ifc_bodies_find(const struct ifc_bodies *b, uint64_t id);

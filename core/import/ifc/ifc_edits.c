@@ -13,7 +13,7 @@ bool ifc_edits_add(struct ifc_edits *e, const struct text *t, struct text_span p
         free(text);
         return false;
     }
-    /* What comes from the file may go over several lines, a change may not. */
+    /* A text from the file may go over several lines, a change may not. */
     for (char *p = text; (p = strpbrk(p, "\r\n")) != NULL;)
         *p = ' ';
     e->edit[e->n++] = (struct ifc_edit){.at = (size_t)(part.p - t->data), .n = part.n, .text = text};
