@@ -6,7 +6,9 @@
  * IfcGeometricRepresentationContext; and IfcMapConversion, which gives the model's origin coordinates in an
  * IfcProjectedCRS. A record that is there, but not as IFC2x3/IFC4 define it, is an error. Nothing is guessed.
  *
- * IfcMapConversion.Scale is map units per unit of the model. Where IfcProjectedCRS has no MapUnit, the map's unit is
+ * IfcMapConversion.Scale is map units per unit of the model; IfcMapConversionScaled has a factor for each axis as well,
+ * and Scale times factor counts. The model is never scaled: factors have to agree within 1 %. Several map conversions
+ * have to say the same. Where IfcProjectedCRS has no MapUnit, the map's unit is
  * found from the model's unit divided by Scale. Metre, the model's own unit, foot and US survey foot are tried in this
  * order, and the first one within 1 % of that quotient is taken. If none is, this is an error. */
 #ifndef CORE_IFC_SITE_H

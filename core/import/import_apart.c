@@ -9,6 +9,7 @@
 #include <string.h>
 #include <sys/mman.h>
 #include <sys/pidfd.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -190,8 +191,31 @@ void import_watch(struct import_apart *const a[], size_t n)
     }
 }
 
+/* Returns the address space that a limit of the user (`ulimit -v`) leaves to the process, in MiB. 0: there is no such
+ * limit, or it is above that of import_child.c. A program that reads has the user's limit alone. */
+static uint64_t user_limit_mib(const struct import_apart *a)
+{
+    struct rlimit limit;
+    if (getrlimit(RLIMIT_AS, &limit) != 0) return 0;
+    const uint64_t own = import_memory_of(getpid(), IMPORT_ADDRESSES) + 2 * ((uint64_t)a->task.limits.memory_mib << 20);
+    const rlim_t most = a->task.argv != NULL ? limit.rlim_cur : limit.rlim_max;
+    if (most == RLIM_INFINITY || (a->task.argv == NULL && most >= own)) return 0;
+    return most >> 20 > 0 ? most >> 20 : 1;
+}
+
+/* how: the way in which it ended. The file may be a good one. */
+static int fail_by_addresses(const struct import_apart *a, const char *how, struct sh_err *err)
+{
+    return build_fail(a->task.b, SH_EINPUT, err,
+                      "%s %s; " IMPORT_USER_LIMIT
+                      " leaves it %llu MiB of addresses, which may be too little: lift that "
+                      "limit",
+                      a->task.name, how, (unsigned long long)user_limit_mib(a));
+}
+
 static int fail_by_memory(const struct import_apart *a, struct sh_err *err)
 {
+    if (user_limit_mib(a) > 0) return fail_by_addresses(a, "ran out of memory", err);
     return build_fail(
         a->task.b, SH_EINPUT, err,
         "%s needs more than %u MiB to read it (scene.import_memory_mib): raise that where the mesh needs more; a "
@@ -223,6 +247,11 @@ static int fail_by_signal(const struct import_apart *a, int number, struct sh_er
             "the process in which %s read it was killed (SIGKILL), as the system does when memory is short; "
             "scene.import_memory_mib is %u: " IMPORT_ELSE_CONVERT,
             a->task.name, a->task.limits.memory_mib);
+    if (user_limit_mib(a) > 0) {
+        char how[48];
+        snprintf(how, sizeof how, "crashed (SIG%s)", name != NULL ? name : "?");
+        return fail_by_addresses(a, how, err);
+    }
     return build_fail(a->task.b, SH_EINPUT, err,
                       "%s crashed while it read the file (SIG%s): the file is broken, or %s has a fault "
                       "itself: " IMPORT_ELSE_CONVERT,
@@ -239,8 +268,11 @@ int import_judge(struct import_apart *a, struct sh_err *err)
     if (WIFSIGNALED(a->status)) return fail_by_signal(a, WTERMSIG(a->status), err);
     /* A request larger than all memory is refused at once, and never counts as memory in use. */
     if (a->said.code == SH_ENOMEM || strstr(a->said.text, "bad_alloc") != NULL) return fail_by_memory(a, err);
+    if (strcasestr(a->said.text, "memory") != NULL && user_limit_mib(a) > 0)
+        return fail_by_addresses(a, "ran out of memory", err);
     if (a->said.code != 0) return sh_fail(err, a->said.code, "%s", a->said.text);
     if (WEXITSTATUS(a->status) == 0) return SH_OK;
+    if (user_limit_mib(a) > 0) return fail_by_addresses(a, "ended without a message", err);
     return build_fail(a->task.b, SH_EINPUT, err,
                       "the process in which %s read it ended without a message (exit status %d): the file is "
                       "broken: " IMPORT_ELSE_CONVERT,

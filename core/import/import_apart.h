@@ -16,6 +16,8 @@
 
 /* At the end of errors, after ": ". */
 #define IMPORT_ELSE_CONVERT "export the mesh again, or convert it to .obj or .ply"
+/* The name of RLIMIT_AS in errors. */
+#define IMPORT_USER_LIMIT "`ulimit -v`"
 
 /* Bytes of a process, as the kernel counts them; 0: not known. */
 enum import_memory { IMPORT_ADDRESSES, IMPORT_RESIDENT };

@@ -246,7 +246,7 @@ static const struct aiScene *import_file(const struct assimp_lib *lib, struct sc
 {
     struct import_open open;
     struct aiLogStream stream = {.callback = keep_log, .user = (char *)(void *)log};
-    import_open_set_up(&open);
+    import_open_set_up(&open, b->spec->file, b->instead);
     lib->aiAttachLogStream(&stream);
     struct aiPropertyStore *options = lib->aiCreatePropertyStore();
     lib->aiSetImportPropertyInteger(options, AI_CONFIG_IMPORT_COLLADA_USE_COLLADA_NAMES, 1); /* not the ids */

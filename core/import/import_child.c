@@ -12,6 +12,7 @@
 #include <signal.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -20,7 +21,7 @@
 #include "core/import/import_result.h"
 #include "core/scene/build_load.h"
 
-enum { RESULT_FD = 3, NOTE_FD, FIRST_FREE_FD };
+enum { RESULT_FD = 3, NOTE_FD, FIRST_FREE_FD, INPUT_FD = FIRST_FREE_FD /* of a program */ };
 enum { PROGRAM_FILES = 256 }; /* node opens some 30 of its own */
 
 _Static_assert(sizeof(struct import_note) <= 4096, "PIPE_BUF on Linux: written in one piece");
@@ -62,6 +63,20 @@ static void set_signals(void)
     sigprocmask(SIG_SETMASK, &none, NULL);
 }
 
+/* Makes the file that a program finds as descriptor 5. pwrite leaves its position at the start. */
+static bool set_input(struct text_span input)
+{
+    const int fd = memfd_create("input", 0);
+    if (fd < 0) return false;
+    for (size_t done = 0; done < input.n;) {
+        const ssize_t n = pwrite(fd, input.p + done, input.n - done, (off_t)done);
+        if (n < 0 && errno == EINTR) continue;
+        if (n <= 0) return false;
+        done += (size_t)n;
+    }
+    return fd == INPUT_FD || dup2(fd, INPUT_FD) == INPUT_FD;
+}
+
 /* Closes all of the parent's descriptors that the task doesn't need: its sockets and terminals must close
  * when the parent closes them. Output is discarded. */
 static int set_descriptors(const struct import_task *task)
@@ -75,7 +90,8 @@ static int set_descriptors(const struct import_task *task)
         if (dup2(nothing, fd) < 0) return 0;
     if (dup2(result, RESULT_FD) < 0 || dup2(note, NOTE_FD) < 0) return 0;
     note_fd = NOTE_FD;
-    return close_range(FIRST_FREE_FD, ~0u, 0) == 0;
+    if (task->argv == NULL) return close_range(FIRST_FREE_FD, ~0u, 0) == 0;
+    return set_input(task->input) && close_range(INPUT_FD + 1, ~0u, 0) == 0;
 }
 
 static int set_limit(__rlimit_resource_t resource, uint64_t value)
@@ -141,6 +157,7 @@ static int read_scene(const struct import_task *task, struct sh_err *err)
     if (rc != SH_OK) return rc;
     own.start_ns = task->b->start_ns;
     build_begin_file(&own, task->b->spec);
+    own.instead = task->b->instead;
     rc = task->read(&own, err);
     if (rc == SH_OK) rc = build_end_file(&own, err);
     return rc == SH_OK ? import_result_write(own.scene, RESULT_FD, err) : rc;

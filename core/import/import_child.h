@@ -6,6 +6,7 @@
 #include <sys/types.h>
 
 #include "core/scene.h"
+#include "core/text.h"
 
 struct scene_build;
 
@@ -25,6 +26,7 @@ struct import_task {
     const char *name;        /* of the reader, for messages */
     const char *const *argv; /* a program that reads, NULL-terminated, found by PATH; NULL: `read`, in a fork */
     int (*read)(struct scene_build *b, struct sh_err *err); /* fills a builder of the fork */
+    struct text_span input;                                 /* a program finds it in a file at descriptor 5 */
     pid_t parent;
     int result_fd, note_fd; /* the scene, the messages; a program finds them as 3 and 4 */
 };

@@ -59,12 +59,12 @@ static struct aiFile *on_open(struct aiFileIO *io, const char *path, const char 
     struct import_open *open = (struct import_open *)(void *)io->UserData;
     const char *why;
     if (strchr(mode, 'r') == NULL) return NULL;
-    FILE *stream = infile_open(path, &why);
-    if (stream == NULL) {
-        if (open->refused[0] == '\0' && access(path, F_OK) == 0)
-            snprintf(open->refused, sizeof open->refused, "%.300s: %s", path, why);
-        return NULL;
-    }
+    const bool is_changed = open->instead.p != NULL && strcmp(path, open->path) == 0;
+    FILE *stream =
+        is_changed ? fmemopen((char *)(uintptr_t)open->instead.p, open->instead.n, "r") : infile_open(path, &why);
+    if (stream == NULL && !is_changed && open->refused[0] == '\0' && access(path, F_OK) == 0)
+        snprintf(open->refused, sizeof open->refused, "%.300s: %s", path, why);
+    if (stream == NULL) return NULL;
     struct aiFile *file = malloc(sizeof *file);
     if (file == NULL) {
         fclose(stream);
@@ -81,8 +81,8 @@ static void on_close(struct aiFileIO *io, struct aiFile *file)
     free(file);
 }
 
-void import_open_set_up(struct import_open *open)
+void import_open_set_up(struct import_open *open, const char *path, struct text_span instead)
 {
-    *open = (struct import_open){.io = {on_open, on_close, NULL}};
+    *open = (struct import_open){.io = {on_open, on_close, NULL}, .path = path, .instead = instead};
     open->io.UserData = (char *)(void *)open;
 }

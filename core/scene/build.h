@@ -17,6 +17,7 @@ struct scene_build {
     const struct sh_report *report;
     /* of the file being read */
     const struct scene_mesh_spec *spec;
+    struct text_span instead;    /* what Assimp reads in place of the file; p NULL: it reads the file */
     char name[128];              /* of the file, for messages; a long path is cut at its front */
     uint64_t line;               /* of a text file, for messages; 0 where there is none */
     const char *mesh;            /* name of the mesh within the file, for messages; may be NULL */

@@ -18,6 +18,10 @@
     "71=IFCCARTESIANPOINT((0.,0.,0.))\n72=IFCCARTESIANPOINT((4.,0.,0.))\n73=IFCCARTESIANPOINT((4.,2.,0.))\n" \
     "74=IFCCARTESIANPOINT((0.,2.,0.))\n75=IFCCARTESIANPOINT((0.,0.,1.))\n76=IFCCARTESIANPOINT((4.,0.,1.))\n" \
     "77=IFCCARTESIANPOINT((4.,2.,1.))\n78=IFCCARTESIANPOINT((0.,2.,1.))\n"
+/* The points of POINTS from the second on, and an index that finds them. */
+#define INDEXED \
+    "70=IFCCARTESIANPOINTLIST3D(((9.,9.,9.),(0.,2.,1.),(4.,2.,1.),(4.,0.,1.),(0.,0.,1.),(0.,2.,0.),(4.,2.,0.),(4.,0.,0.),(0.,0.,0.)))\n"
+#define PN_INDEX "(9,8,7,6,5,4,3,2)"
 #define BREP                                                                                                     \
     "50=IFCFACETEDBREP(@51)\n51=IFCCLOSEDSHELL((@80,@81,@82,@83,@84,@85))\n" CORNERS FACE(80, "@74,@73,@72,@71") \
         FACE(81, "@75,@76,@77,@78") FACE(82, "@71,@72,@76,@75") FACE(83, "@72,@73,@77,@76")                      \
@@ -105,6 +109,18 @@ const struct ifc_shape ifc_shapes[IFC_SHAPES] = {
          "IFCARBITRARYCLOSEDPROFILEDEF(.AREA.,$,@52)",
          "1.") "52=IFCCOMPOSITECURVE((@53,@54),.F.)\n53=IFCCOMPOSITECURVESEGMENT(.CONTINUOUS.,.T.,@55)\n54=IFCCOMPOSITECURVESEGMENT(.CONTINUOUS.,.T.,@60)\n55=IFCPOLYLINE((@56,@57,@58,@59))\n56=IFCCARTESIANPOINT((0.,1.))\n57=IFCCARTESIANPOINT((0.,0.))\n58=IFCCARTESIANPOINT((4.,0.))\n59=IFCCARTESIANPOINT((4.,1.))\n60=IFCTRIMMEDCURVE(@61,(IFCPARAMETERVALUE(0.)),(IFCPARAMETERVALUE(3.141592653589793)),.T.,.PARAMETER.)\n61=IFCCIRCLE(@62,2.)\n62=IFCAXIS2PLACEMENT2D(@63,$)\n63=IFCCARTESIANPOINT((2.,1.))",
      2 * (4 + 2 * PI) + 6 + 2 * PI, 4 + 2 * PI, 2},
+    {"indexed triangles", "@50",
+     INDEXED
+     "50=IFCTRIANGULATEDFACESET(@70,$,.T.,((4,3,2),(4,2,1),(5,6,7),(5,7,8),(1,2,6),(1,6,5),(2,3,7),(2,7,6),(3,4,8),(3,8,7),(4,1,5),(4,5,8))," PN_INDEX
+     ")",
+     28, 8, 0},
+    {"indexed polygons", "@50",
+     INDEXED
+     "50=IFCPOLYGONALFACESET(@70,.T.,(@51,@52,@53,@54,@55,@56)," PN_INDEX
+     ")\n51=IFCINDEXEDPOLYGONALFACE((4,3,2,1))\n52=IFCINDEXEDPOLYGONALFACE((5,6,7,8))\n53=IFCINDEXEDPOLYGONALFACE((1,2,6,5))\n54=IFCINDEXEDPOLYGONALFACE((2,3,7,6))\n55=IFCINDEXEDPOLYGONALFACE((3,4,8,7))\n56=IFCINDEXEDPOLYGONALFACE((4,1,5,8))",
+     28, 8, 0},
+    {"holes in triangles", "@50",
+     INDEXED "50=IFCTRIANGULATEDIRREGULARNETWORK(@70,$,.F.,((5,6,7),(5,7,8),(5,6,8))," PN_INDEX ",(-1,3,-2))", 4, 0, 0},
 };
 
 /* ---- files */

@@ -22,7 +22,7 @@ struct ifc_shape {
 #define IFC_BOX_ROWS           "60=IFCEXTRUDEDAREASOLID(@61,@62,#10,1.)\n" IFC_RECT(61, 4., 2.) IFC_AT(62, 63, "2.,1.,0.")
 
 /* The first is a box, and the names describe the others. */
-enum { IFC_SHAPES = 31 };
+enum { IFC_SHAPES = 34 };
 extern const struct ifc_shape ifc_shapes[IFC_SHAPES];
 
 enum { IFC_TEXT_ROOM = 1 << 17 };

@@ -157,6 +157,46 @@ static void openings_and_styles(void **state)
     scene_free(scene);
 }
 
+/* A clearance, direct and mapped, and a sketch of the body surround it. Both readers would build all of them. */
+static void only_the_body_is_read(void **state)
+{
+    (void)state;
+    needs_readers();
+    ifc_write_text(
+        text, "IFC4", NULL, NULL, ifc_shapes, 1,
+        "#5000=IFCEXTRUDEDAREASOLID(#5001,#12,#10,9.);\n#5001=IFCRECTANGLEPROFILEDEF(.AREA.,$,#17,20.,20.);\n"
+        "#5002=IFCGEOMETRICREPRESENTATIONSUBCONTEXT('Body','Model',*,*,*,*,#13,$,.MODEL_VIEW.,$);\n"
+        "#5003=IFCGEOMETRICREPRESENTATIONSUBCONTEXT('Body','Model',*,*,*,*,#13,$,.SKETCH_VIEW.,$);\n"
+        "#5004=IFCSHAPEREPRESENTATION(#5002,'Body','SweptSolid',(#1060));\n"
+        "#5005=IFCSHAPEREPRESENTATION(#5003,'Body','SweptSolid',(#5000));\n"
+        "#5006=IFCSHAPEREPRESENTATION(#13,'Clearance','SweptSolid',(#5000));\n"
+        "#5007=IFCREPRESENTATIONMAP(#12,#5006);\n#5008=IFCMAPPEDITEM(#5007,#5009);\n"
+        "#5009=IFCCARTESIANTRANSFORMATIONOPERATOR3D($,$,#9,$,$);\n"
+        "#5010=IFCSHAPEREPRESENTATION(#13,'Clearance','MappedRepresentation',(#5008));\n"
+        "#5011=IFCPRODUCTDEFINITIONSHAPE($,$,(#5006,#5004,#5005,#5010));\n"
+        "#5012=IFCBOILER('guid_of_product__00001',#5,'boiler',$,$,#1003,#5011,$,$);\n"
+        "#5013=IFCRELCONTAINEDINSPATIALSTRUCTURE('guid_of_relation_00005',#5,$,$,(#5012),#20);\n"
+        "#5014=IFCPRODUCTDEFINITIONSHAPE($,$,(#5006));\n"
+        "#5015=IFCBOILER('guid_of_product__00002',#5,'space',$,$,#1003,#5014,$,$);\n"
+        "#5016=IFCRELCONTAINEDINSPATIALSTRUCTURE('guid_of_relation_00006',#5,$,$,(#5015,#5017),#20);\n"
+        "#5017=IFCSTRUCTURALSURFACEMEMBER('guid_of_product__00003',#5,'plate',$,$,#1003,#1002,.SHELL.,0.2);\n");
+    must_read(1e-3);
+    double area, volume;
+    measure(1, &area, &volume);
+    assert_true(fabs(area - 28) < 28e-6 && fabs(volume - 8) < 8e-6);
+    assert_int_equal(scene->n_surfaces, 2);
+    assert_int_equal(n_warnings, 3);
+    if (strstr(warnings, "1 product: part of an analysis model, not of the building, so it is not in the scene: "
+                         "IFCSTRUCTURALSURFACEMEMBER 'plate' guid_of_product__00003") == NULL)
+        fail_msg("%s", warnings);
+    if (strstr(warnings, "1 product: with bodies for several views or scales: that for the most detailed one is used: "
+                         "IFCBOILER 'boiler' guid_of_product__00001") == NULL ||
+        strstr(warnings, "1 product: IFC calls none of its representations a body") == NULL ||
+        strstr(warnings, "IFCBOILER 'space' guid_of_product__00002") == NULL)
+        fail_msg("%s", warnings);
+    scene_free(scene);
+}
+
 /* Some programs write colours of 0..255, and percent. The body is read, with the nearest colour, and a warning. */
 static void colours_beyond_their_range_are_limited(void **state)
 {
@@ -252,6 +292,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(shapes_have_their_area_and_volume),
         cmocka_unit_test(openings_and_styles),
+        cmocka_unit_test(only_the_body_is_read),
         cmocka_unit_test(colours_beyond_their_range_are_limited),
         cmocka_unit_test(too_many_products),
 #ifndef SH_SANITIZE /* they run the same code, and take the readers' seconds */

@@ -2,6 +2,7 @@
 /* IFC where a reader fails, waits for ever or isn't there: one-line programs take the place of the two readers, and
  * their failures are reported. The tests that need node are skipped where it is not installed. */
 #include <math.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <time.h>
 
@@ -125,6 +126,50 @@ static void one_reader_may_fail(void **state)
     }
 }
 
+/* Descriptor 5 has the file's size, and a line for each change: here the list of representations of a wall that also
+ * has a clearance. */
+static void readers_get_the_changes(void **state)
+{
+    (void)state;
+    static const char *const rows[] = {"([0-9]+)\\n$", "([0-9]+)\\n[0-9]+ 11 #1001\\n$"};
+    static const char more[] = "#7000=IFCSHAPEREPRESENTATION(#13,'Clearance','SolidModel',(#1060));\n"
+                               "#7001=IFCPRODUCTDEFINITIONSHAPE($,$,(#7000,#1001));\n"
+                               "#7002=IFCWALL('guid_of_wall',#5,'wall',$,$,#1003,#7001,$,$);\n";
+    needs_node();
+    for (int i = 0; i < 2; i++) {
+        char program[2048];
+        snprintf(program, sizeof program,
+                 ONE END "const is = /^%s/.exec(fs.readFileSync(5, 'latin1'))\n"
+                         "if (!is || Number(is[1]) !== fs.statSync(process.argv[2]).size) process.exit(3)\n",
+                 rows[i]);
+        ifc_write_text(text, "IFC4", NULL, NULL, ifc_shapes, 1, i == 1 ? more : NULL);
+        make_stubs(program, program);
+        must_read(1e-3);
+        assert_null(strstr(warnings, "not cross-checked"));
+        scene_free(scene);
+    }
+}
+
+/* Under `ulimit -v` the file may be a good one, so no advice says to export it again. No process reaches this limit. */
+static void limit_of_addresses_is_named(void **state)
+{
+    (void)state;
+    struct rlimit was, limit;
+    needs_node();
+    assert_int_equal(getrlimit(RLIMIT_AS, &was), 0);
+    if (was.rlim_max != RLIM_INFINITY) skip();
+    limit = (struct rlimit){.rlim_cur = (rlim_t)1 << 52, .rlim_max = was.rlim_max};
+    ifc_write_text(text, "IFC4", NULL, NULL, ifc_shapes, 1, NULL);
+    make_stubs("process.exit(3)", "process.exit(3)");
+    assert_int_equal(setrlimit(RLIMIT_AS, &limit), 0);
+    const int rc = read_text(1e-3);
+    assert_int_equal(setrlimit(RLIMIT_AS, &was), 0);
+    assert_int_equal(rc, SH_EINPUT);
+    const char *last = strstr(err.text, "ifc-lite ended without a message; `ulimit -v` leaves it 4294967296 MiB");
+    if (last == NULL || strstr(err.text, "export") != NULL) fail_msg("%s", err.text);
+    assert_string_equal(err.text + strlen(err.text) - 16, " lift that limit");
+}
+
 /* A product's object is its type, name and GlobalId, in up to 255 bytes. "IFCBUILDINGELEMENTPROXY_" and
  * "_guid_of_product__00000" take 47, so the name has 208. A longer one is cut between two letters, and counted. */
 static void long_names_are_cut_between_letters(void **state)
@@ -232,6 +277,16 @@ static void without_node_assimp_reads(void **state)
     must_read(1e-3);
     if (strstr(warnings, "'half space, far' guid_of_product__00000") == NULL) fail_msg("%s", warnings);
     scene_free(scene);
+    /* A profile is no body. Assimp by itself takes the first. */
+    ifc_write_text(text, "IFC2X3", NULL, NULL, ifc_shapes, 1,
+                   "#7000=IFCEXTRUDEDAREASOLID(#7001,#12,#10,9.);\n#7001=IFCRECTANGLEPROFILEDEF(.AREA.,$,#17,9.,9.);\n"
+                   "#7002=IFCSHAPEREPRESENTATION(#13,'Profile','SolidModel',(#7000));\n"
+                   "#7003=IFCPRODUCTDEFINITIONSHAPE($,$,(#7002,#1001));\n"
+                   "#7004=IFCWALL('guid_of_wall_000000000',#5,'wall',$,$,#1003,#7003,$);\n"
+                   "#7005=IFCRELCONTAINEDINSPATIALSTRUCTURE('guid_of_relation_00009',#5,$,$,(#7004),#20);\n");
+    must_read(1e-3);
+    if (!(fabs(total_area(scene) - 2 * 28) < 1e-4)) fail_msg("%g m2", total_area(scene));
+    scene_free(scene);
     limits.ifc_reader = IFC_READER_WEB;
     assert_int_equal(read_text(1e-3), SH_EINPUT);
     setenv("PATH", had, 1);
@@ -243,6 +298,7 @@ int main(void)
         cmocka_unit_test(one_reader_may_fail),         cmocka_unit_test(missing_unit_is_said),
         cmocka_unit_test(facets_of_ifc_lite_are_said), cmocka_unit_test(reader_that_hangs_is_ended),
         cmocka_unit_test(without_node_assimp_reads),   cmocka_unit_test(long_names_are_cut_between_letters),
+        cmocka_unit_test(readers_get_the_changes),     cmocka_unit_test(limit_of_addresses_is_named),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_all);
 }

@@ -142,6 +142,62 @@ static void warnings_are_counted(void **state)
     assert_string_equal(warnings, "many.dae: a reader gave 1003 warnings; the first 1000 are shown");
 }
 
+/* Judges the end of a process in a fork, under a limit of addresses (RLIMIT_AS) that no process reaches. */
+static void judged_under_limit(struct import_apart *a, const char *want)
+{
+    const rlim_t most = (rlim_t)1 << 52; /* 4294967296 MiB */
+    const struct rlimit limit = {.rlim_cur = most, .rlim_max = most};
+    const pid_t pid = fork();
+    if (pid == 0) {
+        struct sh_err err = {0};
+        _exit(setrlimit(RLIMIT_AS, &limit) == 0 && import_judge(a, &err) == SH_EINPUT && strcmp(err.text, want) == 0
+                  ? 0
+                  : 1);
+    }
+    int status;
+    assert_int_equal(waitpid(pid, &status, 0), pid);
+    if (status != 0) fail_msg("status %d, not '%s'", status, want);
+}
+
+/* Under `ulimit -v` a reader of IFC crashes (node: SIGTRAP, SIGSEGV), or says that memory is short. Assimp throws
+ * bad_alloc. The file is not to blame. */
+static void limit_of_the_user_is_named(void **state)
+{
+    (void)state;
+#define LEAVES "; `ulimit -v` leaves it 4294967296 MiB of addresses, which may be too little: lift that limit"
+    static const char *const argv[] = {"node", NULL};
+    const struct scene_mesh_spec spec = {.file = "good.ifc", .scale = 1};
+    struct sh_err err = {0};
+    struct scene_build b;
+    assert_int_equal(build_init(&b, 1e-3, NULL, &err), SH_OK);
+    build_begin_file(&b, &spec);
+    struct import_apart program = {.task = {.b = &b, .limits = scene_import_defaults, .name = "web-ifc", .argv = argv}};
+    struct import_apart a = program;
+    a.status = SIGTRAP;
+    judged_under_limit(&a, "good.ifc: web-ifc crashed (SIGTRAP)" LEAVES);
+    assert_int_equal(import_judge(&a, &err), SH_EINPUT); /* without the limit */
+    assert_string_equal(err.text, "good.ifc: web-ifc crashed while it read the file (SIGTRAP): the file is broken: "
+                                  "export the mesh again, or convert it to .obj or .ply");
+    a = program;
+    a.status = 3 << 8;
+    judged_under_limit(&a, "good.ifc: web-ifc ended without a message" LEAVES);
+    sh_fail(&a.said, SH_EINPUT, "WebAssembly.Instance(): Out of memory: Cannot allocate Wasm memory");
+    judged_under_limit(&a, "good.ifc: web-ifc ran out of memory" LEAVES);
+    sh_fail(&a.said, SH_EINPUT, "good.ifc: nothing in it");
+    judged_under_limit(&a, "good.ifc: nothing in it");
+    /* A fork has a limit of our own as well: that counts while it is the lower one, as 8 GiB are. */
+    a = program;
+    a.task.argv = NULL;
+    sh_fail(&a.said, SH_EINPUT, "std::bad_alloc");
+    judged_under_limit(&a,
+                       "good.ifc: web-ifc needs more than 8192 MiB to read it (scene.import_memory_mib): raise that "
+                       "where the mesh needs more; a broken file may need any amount: export the mesh again, or "
+                       "convert it to .obj or .ply");
+    a.task.limits.memory_mib = UINT32_MAX; /* 8192 TiB, of which two are allowed */
+    judged_under_limit(&a, "good.ifc: web-ifc ran out of memory" LEAVES);
+    build_release(&b);
+}
+
 /* A program may be started with SIGCHLD ignored. The child then has no status, and its output counts. */
 static void signal_of_children_may_be_ignored(void **state)
 {
@@ -349,7 +405,7 @@ int main(void)
         cmocka_unit_test(crash_is_one_line),          cmocka_unit_test(child_has_limits),
         cmocka_unit_test(child_dies_with_its_parent), cmocka_unit_test(signal_of_children_may_be_ignored),
         cmocka_unit_test(no_descriptors_are_left),    cmocka_unit_test(gltf_of_old_gets_assimp_here),
-        cmocka_unit_test(warnings_are_counted),
+        cmocka_unit_test(warnings_are_counted),       cmocka_unit_test(limit_of_the_user_is_named),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -73,14 +73,14 @@ struct command {
 };
 
 static void set_command(struct command *c, struct scene_build *b, const char *folder, const char *script,
-                        const char *name)
+                        const char *name, struct text_span edits)
 {
     const struct scene_import_limits limits = build_limits(b);
     snprintf(c->script, sizeof c->script, "%s/%s", folder, script);
     snprintf(c->memory, sizeof c->memory, "--max-old-space-size=%u", limits.memory_mib);
     const char *const argv[] = {"node", c->memory, c->script, b->spec->file, c->fineness, NULL};
     memcpy(c->argv, argv, sizeof argv);
-    c->apart.task = (struct import_task){.b = b, .limits = limits, .name = name, .argv = c->argv};
+    c->apart.task = (struct import_task){.b = b, .limits = limits, .name = name, .argv = c->argv, .input = edits};
 }
 
 static void ifc_apart_finish(struct import_apart *a, struct ifc_bodies *bodies, bool *has, struct sh_err *said)
@@ -107,11 +107,13 @@ static int ifc_apart_judge(struct scene_build *b, const struct ifc_readings *out
     char web[IFC_REASON_LEN] = "", lite[IFC_REASON_LEN] = "";
     if (out->web_said.code != 0) ifc_reason(b, "web-ifc", &out->web_said, web);
     if (out->lite_said.code != 0) ifc_reason(b, "ifc-lite", &out->lite_said, lite);
-    return sh_fail(err, SH_EINPUT, "%s: no reader can read it: %s%s%s: " IMPORT_ELSE_CONVERT, b->name, web,
-                   *web != '\0' && *lite != '\0' ? "; " : "", lite);
+    const bool is_limited = strstr(web, IMPORT_USER_LIMIT) != NULL || strstr(lite, IMPORT_USER_LIMIT) != NULL;
+    return sh_fail(err, SH_EINPUT, "%s: no reader can read it: %s%s%s%s", b->name, web,
+                   *web != '\0' && *lite != '\0' ? "; " : "", lite, is_limited ? "" : ": " IMPORT_ELSE_CONVERT);
 }
 
-int ifc_run_readers(struct scene_build *b, struct ifc_fineness fineness, struct ifc_readings *out, struct sh_err *err)
+int ifc_run_readers(struct scene_build *b, struct ifc_fineness fineness, struct text_span edits,
+                    struct ifc_readings *out, struct sh_err *err)
 {
     const struct scene_import_limits limits = build_limits(b);
     struct command web = {0}, lite = {0};
@@ -120,9 +122,9 @@ int ifc_run_readers(struct scene_build *b, struct ifc_fineness fineness, struct 
     size_t n = 0;
     *out = (struct ifc_readings){0};
     if (!find_folder(&limits, folder)) return build_fail(b, SH_EINPUT, err, "the readers of IFC are not installed");
-    set_command(&web, b, folder, "web_ifc.mjs", "web-ifc");
+    set_command(&web, b, folder, "web_ifc.mjs", "web-ifc", edits);
     snprintf(web.fineness, sizeof web.fineness, "%d", fineness.segments);
-    set_command(&lite, b, folder, "ifc_lite.mjs", "ifc-lite");
+    set_command(&lite, b, folder, "ifc_lite.mjs", "ifc-lite", edits);
     snprintf(lite.fineness, sizeof lite.fineness, "%s", fineness.level);
     const bool web_asked = limits.ifc_reader != IFC_READER_LITE, lite_asked = limits.ifc_reader != IFC_READER_WEB;
     if (web_asked && import_start(&web.apart, &out->web_said) == SH_OK) all[n++] = &web.apart;

@@ -45,17 +45,17 @@ static const void *ifc_bodies_take(struct reading *r, uint64_t size)
     return at;
 }
 
-static int check_part(const struct reading *r, const struct ifc_part *part)
+static bool is_right(const struct ifc_part *part)
 {
     for (uint32_t i = 0; i < part->n_vertices; i++)
         for (int k = 0; k < 3; k++)
-            if (!(fabs(part->vertex_m[i][k]) <= MOST_M)) return wrong(r, "a vertex out of range");
+            if (!(fabs(part->vertex_m[i][k]) <= MOST_M)) return false;
     for (uint32_t i = 0; i < part->n_triangles; i++)
         for (int k = 0; k < 3; k++)
-            if (part->triangle[i][k] >= part->n_vertices) return wrong(r, "a corner that is not a vertex");
+            if (part->triangle[i][k] >= part->n_vertices) return false;
     for (int k = 0; k < 4; k++)
-        if (isnan(part->colour[k])) return wrong(r, "a colour that is no number");
-    return part->largest_m >= 0.0 && part->largest_m <= MOST_M ? SH_OK : wrong(r, "a rounded coordinate out of range");
+        if (isnan(part->colour[k])) return false;
+    return part->largest_m >= 0.0 && part->largest_m <= MOST_M;
 }
 
 static int read_part(struct reading *r)
@@ -76,7 +76,7 @@ static int read_part(struct reading *r)
     if (!grow(&r->b->part, &r->b->room_parts, r->b->n_parts + 1, sizeof part))
         return sh_fail(r->err, SH_ENOMEM, "no memory for parts");
     r->b->part[r->b->n_parts++] = part;
-    return check_part(r, &part);
+    return SH_OK;
 }
 
 /* 1: a product, 0: the end. */
@@ -102,6 +102,13 @@ static int read_product(struct reading *r)
     int rc = SH_OK;
     for (uint32_t i = 0; i < head.n_parts && rc == SH_OK; i++)
         rc = read_part(r);
+    bool is_usable = true;
+    for (size_t i = body->first; i < r->b->n_parts; i++)
+        is_usable = is_usable && is_right(&r->b->part[i]);
+    if (rc == SH_OK && !is_usable) {
+        body->n_parts = 0;
+        r->b->n_wrong++;
+    }
     return rc == SH_OK ? 1 : rc;
 }
 

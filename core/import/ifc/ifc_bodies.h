@@ -29,7 +29,7 @@ struct ifc_body {
     uint64_t id;
     struct text_span type; /* as a reader writes it, in mixed case */
     uint32_t n_failures;
-    size_t first, n_parts; /* in part */
+    size_t first, n_parts; /* in part; 0 parts where one of its numbers is wrong */
     struct ifc_figures figures;
 };
 
@@ -41,9 +41,12 @@ struct ifc_bodies {
     size_t n_parts, room_parts;
     struct ifc_body *body; /* [n] by id */
     size_t n, room;
+    size_t n_wrong; /* bodies that are left out since one of their numbers is wrong */
 };
 
-/* Nothing in the file is trusted: SH_EINPUT says what is wrong. ifc_bodies_free is due in any case. */
+/* Nothing in the file is trusted: SH_EINPUT says what is wrong with its form. A wrong number (a coordinate beyond 1e9 m
+ * or NaN, a colour that is NaN, a corner that is no vertex) takes its body away, not the others. ifc_bodies_free is due
+ * in any case. */
 int ifc_bodies_read(struct ifc_bodies *b, int fd, struct sh_err *err);
 void ifc_bodies_free(struct ifc_bodies *b);
 const struct ifc_body *ifc_bodies_find(const struct ifc_bodies *b, uint64_t id);

@@ -56,10 +56,17 @@ static struct ifc_choice choose_single(const struct ifc_body *web, const struct 
     return (struct ifc_choice){source, ifc_is_closed(&body->figures) ? IFC_AGREED : IFC_OPEN};
 }
 
+static enum ifc_finding finding_without_body(const struct ifc_product *product)
+{
+    if (product->has_body) return IFC_LOST;
+    if (product->is_boxed) return IFC_BOXED;
+    return product->is_unbodied ? IFC_UNBODIED : IFC_AGREED;
+}
+
 struct ifc_choice ifc_choose(const struct ifc_product *product, const struct ifc_body *web, const struct ifc_body *lite,
                              bool is_checked)
 {
-    if (web == NULL && lite == NULL) return (struct ifc_choice){IFC_NONE, product->has_body ? IFC_LOST : IFC_AGREED};
+    if (web == NULL && lite == NULL) return (struct ifc_choice){IFC_NONE, finding_without_body(product)};
     if (web == NULL || lite == NULL) return choose_single(web, lite, is_checked);
     const struct ifc_figures *w = &web->figures, *l = &lite->figures;
     const bool web_closed = ifc_is_closed(w), lite_closed = ifc_is_closed(l);
@@ -80,6 +87,11 @@ static const struct {
     bool is_doubtful;
 } findings[IFC_FINDINGS] = {
     [IFC_LOST] = {"its records have a body, but neither reader makes one, so it is not in the scene", true},
+    [IFC_BOXED] = {"the only shape is a bounding box, which is no surface, so it is not in the scene", true},
+    [IFC_UNBODIED] =
+        {"IFC calls none of its representations a body (a clearance, for example, is none), so it is not in "
+         "the scene",
+         true},
     [IFC_BOX] = {"the two readers make bodies of different size or place", true},
     [IFC_AREA] = {"the two readers make bodies of different area or volume", true},
     [IFC_ONLY_WEB] = {"only web-ifc makes a body, and this body is used", true},
@@ -88,6 +100,7 @@ static const struct {
     [IFC_CLOSED_LITE] = {"web-ifc leaves the body open: the closed body of ifc-lite is used", true},
     [IFC_OPEN] = {"the body is open", false},
     [IFC_FAILED] = {"the reader says that parts of the body failed", true},
+    [IFC_ANALYSIS] = {"part of an analysis model, not of the building, so it is not in the scene", false},
     [IFC_UNCUT] = {"no IfcRelVoidsElement says what it opens, so it opens nothing", true},
 };
 

@@ -13,6 +13,8 @@ enum ifc_source { IFC_NONE, IFC_WEB, IFC_LITE };
 enum ifc_finding {
     IFC_AGREED,
     IFC_LOST,        /* its records have a body, and no reader makes one */
+    IFC_BOXED,       /* its only shape is a bounding box */
+    IFC_UNBODIED,    /* IFC calls none of its representations a body */
     IFC_BOX,         /* both make one, of different size or place */
     IFC_AREA,        /* both make one, of different area or volume */
     IFC_ONLY_WEB,    /* only that reader makes one */
@@ -21,6 +23,7 @@ enum ifc_finding {
     IFC_CLOSED_LITE, /* likewise */
     IFC_OPEN,        /* both make the same, or one was run; the body is open */
     IFC_FAILED,      /* the reader whose body is taken reports a failure */
+    IFC_ANALYSIS,    /* its surfaces are those of an analysis model */
     IFC_UNCUT,       /* the records have an opening that cuts nothing */
     IFC_FINDINGS,
 };

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 // ifc-lite reads an IFC file, and this program writes its bodies to descriptor 3, in the form of result.mjs.
+// Descriptor 5 gives changes to the file; it may be empty.
 //   node ifc_lite.mjs FILE LEVEL      LEVEL is lowest, low, medium, high or highest; it sets how fine curves are cut up
 import fs from 'node:fs'
 import { createRequire } from 'node:module'

@@ -19,9 +19,13 @@ struct ifc_product {
     struct text_span type; /* as the file has it, in capitals */
     char *guid, *name;     /* UTF-8, whole; may be empty */
     uint64_t shape;        /* its IfcProductDefinitionShape; 0: none */
-    bool is_air;           /* a type without a surface: air, a drawing or a connection (ifc_records.c) */
-    bool opens_nothing;    /* an opening that no IfcRelVoidsElement names */
-    bool has_body;         /* its shape, walked through, has a solid or a surface */
+    bool is_air;        /* a type without a surface: air, a drawing or a connection, or is_analysis (ifc_records.c) */
+    bool is_analysis;   /* part of an analysis model, which is not built */
+    bool opens_nothing; /* an opening that no IfcRelVoidsElement names */
+    bool has_body;      /* its shape has a solid or a surface that is a body */
+    bool is_boxed;      /* its shape has a bounding box, and neither a solid nor a surface */
+    bool is_unbodied;   /* its shape has solids or surfaces, but IFC calls none of them a body */
+    bool is_level;      /* its shape has bodies for several views or scales, and one is taken */
     bool is_curved;
     int finding;                   /* enum ifc_finding, once its body is chosen */
     bool is_coarse;                /* curved, and the body is ifc-lite's, which cuts circles up by levels of its own */

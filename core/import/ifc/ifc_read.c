@@ -119,6 +119,7 @@ static int add_products(struct reading *r)
     for (size_t i = 0; i < r->records.n_products && rc == SH_OK; i++) {
         struct ifc_product *p = &r->records.product[i];
         if (p->opens_nothing) p->finding = IFC_UNCUT;
+        if (p->is_analysis && p->has_body) p->finding = IFC_ANALYSIS;
         if (p->is_air) continue;
         const struct ifc_body *web = with_parts(&in->web, in->has_web, p->id),
                               *lite = with_parts(&in->lite, in->has_lite, p->id);
@@ -143,6 +144,14 @@ static int say_missing(struct reading *r, const char *name, const struct sh_err 
                           why);
     build_warn(r->b, "not cross-checked: %s gave no answer: %s", name, why);
     return SH_OK;
+}
+
+/* The products are named by their findings, since the reader has no body for them. */
+static void say_wrong(struct reading *r, const char *name, const struct ifc_bodies *bodies)
+{
+    if (bodies->n_wrong == 0) return;
+    build_warn(r->b, "%s makes %zu bod%s with a wrong number, NaN for example: %s not used", name, bodies->n_wrong,
+               bodies->n_wrong > 1 ? "ies" : "y", bodies->n_wrong > 1 ? "they are" : "it is");
 }
 
 /* A circle gets at most MOST_SEGMENTS sides. A file's largest circle may need more sides to stay within the
@@ -182,14 +191,21 @@ static int check_number(struct reading *r)
 static int read_by_two(struct reading *r)
 {
     const struct ifc_fineness fineness = fineness_for(&r->records, r->b->tolerance_m);
+    size_t n_edits;
     int rc = check_number(r);
     if (rc != SH_OK) return rc;
     build_announce(r->b);
-    rc = ifc_run_readers(r->b, fineness, &r->readings, r->err);
+    char *edits = ifc_edits_write(&r->records.edits, &r->records.index.text, &n_edits);
+    if (edits == NULL) return ifc_no_memory(&r->records.index, r->err);
+    rc = ifc_run_readers(r->b, fineness, (struct text_span){edits, n_edits}, &r->readings, r->err);
+    free(edits);
     if (rc == SH_OK) rc = say_missing(r, "web-ifc", &r->readings.web_said);
     if (rc == SH_OK) rc = say_missing(r, "ifc-lite", &r->readings.lite_said);
+    say_wrong(r, "web-ifc", &r->readings.web);
+    say_wrong(r, "ifc-lite", &r->readings.lite);
     if (rc == SH_OK) rc = add_products(r);
     if (rc == SH_OK) rc = say_facets(r, &fineness);
+    if (rc == SH_OK) ifc_say_levels(r->b, r->records.product, r->records.n_products);
     if (rc == SH_OK) ifc_say_coarse(r->b, r->records.product, r->records.n_products);
     if (rc == SH_OK)
         rc = ifc_say_findings(r->b, r->records.product, r->records.n_products, r->limits.ifc_strict, r->err);
@@ -205,7 +221,14 @@ static int read_by_assimp(struct reading *r, const char *why)
                           "%s, so nothing is cross-checked, but scene.ifc_strict demands both readers", why);
     if (!asked) build_warn(r->b, "%s: Assimp reads it", why);
     const int rc = ifc_say_assimp(r->b, r->records.product, r->records.n_products, !asked, why, r->err);
-    return rc == SH_OK ? import_apart(r->b, r->err) : rc;
+    if (rc != SH_OK) return rc;
+    /* The records' text lacks the representations that are no body. */
+    if (r->records.edits.n > 0)
+        r->b->instead = (struct text_span){r->records.index.text.data, r->records.index.text.size};
+    const int read = import_apart(r->b, r->err);
+    r->b->instead = (struct text_span){NULL, 0};
+    if (read == SH_OK) ifc_say_levels(r->b, r->records.product, r->records.n_products);
+    return read;
 }
 
 /* Warns of an unknown unit: readers mostly take it for metres. */

@@ -33,8 +33,10 @@ bool ifc_readers_are_there(const struct scene_import_limits *limits, char *why, 
 enum { IFC_REASON_LEN = 150 };
 void ifc_reason(const struct scene_build *b, const char *name, const struct sh_err *said, char out[IFC_REASON_LEN]);
 
-/* Runs the readers that are asked for, both at the same time. Fails where none gives an answer. */
-int ifc_run_readers(struct scene_build *b, struct ifc_fineness fineness, struct ifc_readings *out, struct sh_err *err);
+/* Runs the readers that are asked for, both at the same time. edits: changes to the file (ifc_edits_write). Fails where
+ * none gives an answer. */
+int ifc_run_readers(struct scene_build *b, struct ifc_fineness fineness, struct text_span edits,
+                    struct ifc_readings *out, struct sh_err *err);
 void ifc_readings_free(struct ifc_readings *r);
 
 /* ---- ifc_say.c */
@@ -43,6 +45,8 @@ void ifc_readings_free(struct ifc_readings *r);
  * line of the first doubtful finding is an error instead. */
 int ifc_say_findings(struct scene_build *b, const struct ifc_product *product, size_t n_products, bool strict,
                      struct sh_err *err);
+/* Names the products that have bodies for several views or scales. */
+void ifc_say_levels(struct scene_build *b, const struct ifc_product *product, size_t n_products);
 /* Names the curved products whose facets follow no tolerance. */
 void ifc_say_coarse(struct scene_build *b, const struct ifc_product *product, size_t n_products);
 /* Names the products that Assimp may read wrongly, in a warning or, with refuse, in an error. why: the reason that no

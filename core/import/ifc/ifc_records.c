@@ -5,6 +5,8 @@
 #include <string.h>
 
 #include "core/grow.h"
+#include "core/import/ifc/ifc_points.h"
+#include "core/import/ifc/ifc_shapes.h"
 #include "core/import/ifc/ifc_styles.h"
 #include "core/import/ifc/ifc_text.h"
 #include "core/import/ifc/ifc_unit.h"
@@ -17,6 +19,14 @@ enum { PRODUCT_GUID = 0, PRODUCT_NAME = 2, PRODUCT_PLACEMENT = 5, PRODUCT_SHAPE 
 const struct ifc_product *ifc_records_product(const struct ifc_records *r, uint64_t id)
 {
     return r->n_products > 0 ? bsearch(&id, r->product, r->n_products, sizeof *r->product, ifc_compare) : NULL;
+}
+
+/* Members, connections and loads of an analysis model, IfcStructuralItem and IfcStructuralActivity: the building's own
+ * walls and slabs stand in the same places. */
+static bool is_analysis(struct text_span type)
+{
+    static const char start[] = "IFCSTRUCTURAL";
+    return type.n >= sizeof start - 1 && memcmp(type.p, start, sizeof start - 1) == 0;
 }
 
 /* Types without a surface: air, drawings, and connections. */
@@ -70,7 +80,8 @@ static int add_product(struct ifc_records *r, const struct step_record *record, 
                               .guid = ifc_text(arg[PRODUCT_GUID]),
                               .name = ifc_text(arg[PRODUCT_NAME]),
                               .shape = shape,
-                              .is_air = is_air(record->type)};
+                              .is_analysis = is_analysis(record->type),
+                              .is_air = is_air(record->type) || is_analysis(record->type)};
     if (p->guid == NULL || p->name == NULL) return ifc_no_memory(&r->index, err);
     return check_placement(r, p, arg[PRODUCT_PLACEMENT], err);
 }
@@ -85,6 +96,8 @@ int ifc_records_open(struct ifc_records *r, const char *path, struct sh_err *err
     if (r->mark == NULL) return ifc_no_memory(&r->index, err);
     for (size_t i = 0; i < r->index.n && rc == SH_OK; i++)
         rc = add_product(r, &r->index.record[i], err);
+    if (rc == SH_OK) rc = ifc_shapes_choose(&r->index, r->product, r->n_products, &r->edits, err);
+    if (rc == SH_OK) rc = ifc_points_resolve(&r->index, &r->edits, err);
     if (rc == SH_OK) rc = ifc_styles_collect(r, err);
     return rc == SH_OK ? ifc_walk(r, err) : rc;
 }
@@ -102,5 +115,6 @@ void ifc_records_close(struct ifc_records *r)
     for (size_t i = 0; i < r->n_styles; i++)
         free(r->style[i].name);
     free(r->style);
+    ifc_edits_free(&r->edits);
     ifc_index_close(&r->index);
 }

@@ -8,6 +8,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "core/import/ifc/ifc_edits.h"
 #include "core/import/ifc/ifc_index.h"
 #include "core/import/ifc/ifc_product.h"
 
@@ -24,7 +25,8 @@ struct ifc_records {
     uint32_t *mark, stamp;
     struct ifc_style *style; /* [n_styles] by item */
     size_t n_styles, room_styles;
-    size_t n_limited; /* styles whose colour or transparency was beyond 0..1, and is limited to it */
+    struct ifc_edits edits; /* what the readers of bodies get in another form than the file has it */
+    size_t n_limited;       /* styles whose colour or transparency was beyond 0..1, and is limited to it */
 };
 
 /* Reads records and products; ifc_records_close is due in any case. Errors are those of ifc_index_open. A placement

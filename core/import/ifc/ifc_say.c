@@ -8,14 +8,14 @@
 enum { MAX_NAMED = 100, LINE_ROOM = 420 /* the rest of a line has room for ", and N more" */ };
 
 /* Groups of products that are no findings. */
-enum { COARSE = IFC_FINDINGS, MISREAD };
+enum { COARSE = IFC_FINDINGS, LEVELS, MISREAD };
 
 /* The products of a group are named line by line. */
 struct lines {
     struct scene_build *b;
     const struct ifc_product *product; /* [n_products] */
     size_t n_products;
-    int group; /* a finding, COARSE or MISREAD */
+    int group; /* a finding, COARSE, LEVELS or MISREAD */
     const char *text;
     size_t n;        /* products of the group */
     size_t n_listed; /* on this line and before */
@@ -49,6 +49,7 @@ static void add_name(struct lines *l, const struct ifc_product *p)
 static bool is_in_group(const struct lines *l, const struct ifc_product *p)
 {
     if (l->group == MISREAD) return !p->is_air && p->assimp_wrong.n > 0;
+    if (l->group == LEVELS) return !p->is_air && p->is_level;
     return l->group == COARSE ? p->is_coarse : p->finding == l->group;
 }
 
@@ -88,6 +89,14 @@ int ifc_say_findings(struct scene_build *b, const struct ifc_product *product, s
         say_group(&l);
     }
     return SH_OK;
+}
+
+void ifc_say_levels(struct scene_build *b, const struct ifc_product *product, size_t n_products)
+{
+    struct lines l = {b, product, n_products, LEVELS,
+                      .text = "with bodies for several views or scales: that for the most detailed one is used"};
+    count_group(&l);
+    say_group(&l);
 }
 
 void ifc_say_coarse(struct scene_build *b, const struct ifc_product *product, size_t n_products)

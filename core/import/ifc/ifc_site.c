@@ -7,23 +7,27 @@
 #include <string.h>
 
 #include "core/angle.h"
+#include "core/grow.h"
 #include "core/import/ifc/ifc_index.h"
 #include "core/import/ifc/ifc_text.h"
 #include "core/import/ifc/ifc_unit.h"
 #include "core/import/ifc/step.h"
 
-/* Places of attributes in a record, IFC2x3 TC1 and IFC4 ADD2. */
+/* Places of attributes in a record, IFC2x3 TC1 and IFC4 ADD2. IfcMapConversionScaled is of IFC 4.3. */
 enum { SITE_PLACEMENT = 5, SITE_LATITUDE = 9, SITE_LONGITUDE = 10, SITE_ELEVATION = 11, SITE_ARGS = 14 };
 enum { CONTEXT_TYPE = 1, CONTEXT_WORLD = 4, CONTEXT_NORTH = 5, CONTEXT_ARGS = 6 };
 enum { MAP_CRS = 1, MAP_EASTING, MAP_NORTHING, MAP_HEIGHT, MAP_ABSCISSA, MAP_ORDINATE, MAP_SCALE, MAP_ARGS };
+enum { MAP_FACTOR_X = MAP_ARGS, MAP_FACTOR_Y, MAP_FACTOR_Z, MAP_SCALED_ARGS };
 enum { CRS_NAME = 0, CRS_UNIT = 6, CRS_ARGS = 7 };
 
 static const char ADVICE[] = "use scene.anchor.source: explicit, which needs none of this";
 
 struct reader {
     struct ifc_index index;
-    struct step_record site, context, map;
-    int n_sites, n_contexts, n_maps, is_model;
+    struct step_record site, context;
+    struct step_record *map; /* [n_maps], of any context */
+    size_t n_maps, room_maps;
+    int n_sites, n_contexts, is_model;
     struct sh_err *err;
 };
 
@@ -70,8 +74,8 @@ static int take_record(struct reader *r, const struct step_record *record)
         if (r->n_sites++ > 0) return ifc_site_fail(r, record, "a second site with a latitude; allowed one");
     }
     if (text_is(record->type, "IFCMAPCONVERSION") || text_is(record->type, "IFCMAPCONVERSIONSCALED")) {
-        r->map = *record;
-        if (r->n_maps++ > 0) return ifc_site_fail(r, record, "a second map conversion; allowed one");
+        if (!grow(&r->map, &r->room_maps, r->n_maps + 1, sizeof *r->map)) return ifc_no_memory(&r->index, r->err);
+        r->map[r->n_maps++] = *record;
     }
     return text_is(record->type, "IFCGEOMETRICREPRESENTATIONCONTEXT") ? take_context(r, record) : SH_OK;
 }
@@ -219,42 +223,76 @@ static double known_unit_m(double m, double model_m)
     return NAN;
 }
 
-/* Scale has to be the factor from the model's unit to MapUnit, up to 1 % for the map's own scale. A Scale of 1 says
+/* A map conversion that is being read, with its numbers by the places of attributes. */
+struct conversion {
+    const struct step_record *record;
+    double value[MAP_SCALED_ARGS];
+    double scale; /* of the x axis: Scale times FactorX */
+};
+
+/* The scale has to be the factor from the model's unit to MapUnit, up to 1 % for the map's own scale. A Scale of 1 says
  * nothing, since it also stands for one that is left out. */
-static int check_scale(struct reader *r, double scale, double expected)
+static int check_scale(struct reader *r, const struct conversion *c, double expected)
 {
     char what[128];
-    if (scale == 1.0 || fabs(scale / expected - 1.0) < 0.01) return SH_OK;
+    if (c->value[MAP_SCALE] == 1.0 && fabs(c->scale - 1.0) < 0.01) return SH_OK;
+    if (fabs(c->scale / expected - 1.0) < 0.01) return SH_OK;
     snprintf(what, sizeof what,
-             "a Scale of %.9g beside a MapUnit; allowed about %.9g, the model's unit in units of the map", scale,
+             "a Scale of %.9g beside a MapUnit; allowed about %.9g, the model's unit in units of the map", c->scale,
              expected);
-    return ifc_site_fail(r, &r->map, what);
+    return ifc_site_fail(r, c->record, what);
 }
 
-static int read_map_unit(struct reader *r, const struct found *crs, double scale, double model_m, double *m)
+/* IFC 4.3 multiplies each axis by Scale and by a factor of its own. The model is not stretched here. Factors that
+ * differ by less than 1 % are a map's own scale, as above. */
+static int check_factors(struct reader *r, const struct conversion *c)
+{
+    const double *v = c->value;
+    char what[160];
+    for (int i = MAP_SCALE; i < MAP_SCALED_ARGS; i++)
+        if (!(v[i] > 0.0))
+            return ifc_site_fail(r, c->record,
+                                 i == MAP_SCALE ? "a Scale that is not above 0"
+                                                : "a factor of an axis that is not above 0");
+    for (int i = MAP_FACTOR_Y; i <= MAP_FACTOR_Z; i++) {
+        if (fabs(v[i] / v[MAP_FACTOR_X] - 1.0) < 0.01) continue;
+        snprintf(
+            what, sizeof what,
+            "factors of %.9g, %.9g and %.9g for the axes; allowed within 1 %% of each other, since the model is not "
+            "stretched",
+            v[MAP_FACTOR_X], v[MAP_FACTOR_Y], v[MAP_FACTOR_Z]);
+        return ifc_site_fail(r, c->record, what);
+    }
+    return SH_OK;
+}
+
+static int read_map_unit(struct reader *r, const struct conversion *c, const struct found *crs, double model_m,
+                         double *m)
 {
     uint64_t id;
     if (step_reference(crs->arg[CRS_UNIT], &id)) {
         int rc = advise(r, ifc_unit_of(&r->index, ifc_index_find(&r->index, id), m, r->err));
-        return rc == SH_OK ? check_scale(r, scale, model_m / *m) : rc;
+        return rc == SH_OK ? check_scale(r, c, model_m / *m) : rc;
     }
-    *m = known_unit_m(model_m / scale, model_m);
-    return isnan(*m) ? ifc_site_fail(r, &r->map, "its Scale fits no unit of maps, and the system has no MapUnit")
+    *m = known_unit_m(model_m / c->scale, model_m);
+    return isnan(*m) ? ifc_site_fail(r, c->record, "its Scale fits no unit of maps, and the system has no MapUnit")
                      : SH_OK;
 }
 
 /* Reads a number of the map conversion. Eastings and Northings must be there; a height that is missing is NaN. */
-static int read_number(struct reader *r, struct text_span arg, int which, double *value)
+static int read_number(struct reader *r, struct conversion *c, struct text_span arg, int which)
 {
-    static const char *const name[MAP_ARGS] = {
+    static const char *const name[MAP_SCALED_ARGS] = {
         [MAP_EASTING] = "Eastings",       [MAP_NORTHING] = "Northings",     [MAP_HEIGHT] = "OrthogonalHeight",
-        [MAP_ABSCISSA] = "XAxisAbscissa", [MAP_ORDINATE] = "XAxisOrdinate", [MAP_SCALE] = "Scale"};
+        [MAP_ABSCISSA] = "XAxisAbscissa", [MAP_ORDINATE] = "XAxisOrdinate", [MAP_SCALE] = "Scale",
+        [MAP_FACTOR_X] = "FactorX",       [MAP_FACTOR_Y] = "FactorY",       [MAP_FACTOR_Z] = "FactorZ"};
+    double *value = &c->value[which];
     char what[64];
     *value = which == MAP_HEIGHT ? NAN : which == MAP_ORDINATE ? 0.0 : 1.0;
     if (text_is(arg, "$") && which > MAP_NORTHING) return SH_OK;
     if (step_real(&r->index.text, arg, value)) return SH_OK;
     snprintf(what, sizeof what, "%s is missing, or is not a number", name[which]);
-    return ifc_site_fail(r, &r->map, what);
+    return ifc_site_fail(r, c->record, what);
 }
 
 static int read_map_name(struct reader *r, const struct found *crs, struct ifc_map *map)
@@ -270,27 +308,65 @@ static int read_map_name(struct reader *r, const struct found *crs, struct ifc_m
                                "its name is missing or over 127 bytes long; allowed is one such as \"EPSG:25832\"");
 }
 
-static int read_map(struct reader *r, double unit_m, struct ifc_map *map)
+static int read_map_numbers(struct reader *r, struct conversion *c, const struct text_span *arg, int n)
 {
+    int rc = SH_OK;
+    for (int i = MAP_FACTOR_X; i <= MAP_FACTOR_Z; i++)
+        c->value[i] = 1.0;
+    for (int i = MAP_EASTING; i < n && rc == SH_OK; i++)
+        rc = read_number(r, c, arg[i], i);
+    if (rc == SH_OK) rc = check_factors(r, c);
+    c->scale = c->value[MAP_SCALE] * c->value[MAP_FACTOR_X];
+    if (rc == SH_OK && !(hypot(c->value[MAP_ABSCISSA], c->value[MAP_ORDINATE]) > 1e-9))
+        rc = ifc_site_fail(r, c->record, "an x axis without a direction");
+    return rc;
+}
+
+static int read_map(struct reader *r, const struct step_record *record, double unit_m, struct ifc_map *map)
+{
+    const bool is_scaled = text_is(record->type, "IFCMAPCONVERSIONSCALED");
+    const int n = is_scaled ? MAP_SCALED_ARGS : MAP_ARGS;
+    struct conversion c = {.record = record};
     struct text_span arg[STEP_MAX_ARGS];
     struct found crs;
-    double value[MAP_ARGS], map_unit_m = 1.0;
-    if (step_split(r->map.args, arg, STEP_MAX_ARGS) < MAP_ARGS)
-        return ifc_site_fail(r, &r->map, "not the 8 attributes that IFC defines");
-    int rc = ifc_site_follow(r, &r->map, arg[MAP_CRS], "IFCPROJECTEDCRS", CRS_ARGS, &crs);
+    double map_unit_m = 1.0;
+    *map = (struct ifc_map){.crs = ""};
+    if (step_split(record->args, arg, STEP_MAX_ARGS) < (size_t)n)
+        return ifc_site_fail(
+            r, record, is_scaled ? "not the 11 attributes that IFC defines" : "not the 8 attributes that IFC defines");
+    int rc = ifc_site_follow(r, record, arg[MAP_CRS], "IFCPROJECTEDCRS", CRS_ARGS, &crs);
     if (rc == SH_OK) rc = read_map_name(r, &crs, map);
-    for (int i = MAP_EASTING; i < MAP_ARGS && rc == SH_OK; i++)
-        rc = read_number(r, arg[i], i, &value[i]);
-    if (rc == SH_OK && !(value[MAP_SCALE] > 0.0)) rc = ifc_site_fail(r, &r->map, "a Scale that is not above 0");
-    if (rc == SH_OK && !(hypot(value[MAP_ABSCISSA], value[MAP_ORDINATE]) > 1e-9))
-        rc = ifc_site_fail(r, &r->map, "an x axis without a direction");
-    if (rc == SH_OK) rc = read_map_unit(r, &crs, value[MAP_SCALE], unit_m, &map_unit_m);
+    if (rc == SH_OK) rc = read_map_numbers(r, &c, arg, n);
+    if (rc == SH_OK) rc = read_map_unit(r, &c, &crs, unit_m, &map_unit_m);
     if (rc != SH_OK) return rc;
-    map->easting_m = value[MAP_EASTING] * map_unit_m;
-    map->northing_m = value[MAP_NORTHING] * map_unit_m;
-    map->height_m = value[MAP_HEIGHT] * map_unit_m;
-    map->x_axis_rad = atan2(value[MAP_ORDINATE], value[MAP_ABSCISSA]);
+    map->easting_m = c.value[MAP_EASTING] * map_unit_m;
+    map->northing_m = c.value[MAP_NORTHING] * map_unit_m;
+    map->height_m = c.value[MAP_HEIGHT] * map_unit_m;
+    map->x_axis_rad = atan2(c.value[MAP_ORDINATE], c.value[MAP_ABSCISSA]);
     return SH_OK;
+}
+
+static bool is_same_number(double a, double b)
+{
+    return (isnan(a) && isnan(b)) || fabs(a - b) < 1e-9;
+}
+
+/* A model may have a map conversion for each of its contexts, as those of the model and of plans. They have to say the
+ * same. */
+static int read_maps(struct reader *r, double unit_m, struct ifc_map *map)
+{
+    struct ifc_map other;
+    int rc = read_map(r, &r->map[0], unit_m, map);
+    for (size_t i = 1; i < r->n_maps && rc == SH_OK; i++) {
+        rc = read_map(r, &r->map[i], unit_m, &other);
+        if (rc == SH_OK &&
+            (strcmp(map->crs, other.crs) != 0 || !is_same_number(map->easting_m, other.easting_m) ||
+             !is_same_number(map->northing_m, other.northing_m) || !is_same_number(map->height_m, other.height_m) ||
+             !is_same_number(map->x_axis_rad, other.x_axis_rad)))
+            rc = ifc_site_fail(r, &r->map[i],
+                               "a second map conversion, which says something else; allowed one, or equal ones");
+    }
+    return rc;
 }
 
 /* ---- the site */
@@ -320,9 +396,10 @@ int ifc_site_read(const char *path, struct ifc_site *site, struct sh_err *err)
     if (rc == SH_OK) rc = advise(&r, ifc_unit_find(&r.index, &unit_m, err));
     if (rc == SH_OK && r.n_sites > 0) rc = read_site(&r, unit_m, site);
     if (rc == SH_OK) rc = read_north(&r, site);
-    if (rc == SH_OK && r.n_maps > 0) rc = read_map(&r, unit_m, &site->map);
+    if (rc == SH_OK && r.n_maps > 0) rc = read_maps(&r, unit_m, &site->map);
     site->has_place = r.n_sites > 0;
     site->has_map = r.n_maps > 0;
+    free(r.map);
     ifc_index_close(&r.index);
     return rc;
 }

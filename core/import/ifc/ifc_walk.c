@@ -16,7 +16,6 @@
 enum kind {
     PLAIN = 0,
     STOP = 1,        /* no geometry follows from here */
-    BODY = 2,        /* a solid or a surface */
     CURVED = 4,      /* it has circles or other curves, which readers cut up */
     ASSIMP_ERRS = 8, /* Assimp is known to get it wrong without a message */
     POINTS = 16,     /* points, which may be far */
@@ -31,13 +30,13 @@ struct type_kind {
 
 /* By name, for bsearch. */
 static const struct type_kind kinds[] = {
-    {"IFCADVANCEDBREP", BODY | CURVED | ASSIMP_ERRS},
-    {"IFCADVANCEDBREPWITHVOIDS", BODY | CURVED | ASSIMP_ERRS},
+    {"IFCADVANCEDBREP", CURVED | ASSIMP_ERRS},
+    {"IFCADVANCEDBREPWITHVOIDS", CURVED | ASSIMP_ERRS},
     {"IFCARBITRARYPROFILEDEFWITHVOIDS", ASSIMP_ERRS},
     {"IFCASYMMETRICISHAPEPROFILEDEF", ASSIMP_ERRS},
-    {"IFCBLOCK", BODY | ASSIMP_ERRS},
-    {"IFCBOOLEANCLIPPINGRESULT", BODY | ASSIMP_ERRS},
-    {"IFCBOOLEANRESULT", BODY | ASSIMP_ERRS},
+    {"IFCBLOCK", ASSIMP_ERRS},
+    {"IFCBOOLEANCLIPPINGRESULT", ASSIMP_ERRS},
+    {"IFCBOOLEANRESULT", ASSIMP_ERRS},
     {"IFCBSPLINECURVEWITHKNOTS", CURVED},
     {"IFCBSPLINESURFACEWITHKNOTS", CURVED | ASSIMP_ERRS},
     {"IFCCARTESIANPOINT", POINTS},
@@ -46,44 +45,40 @@ static const struct type_kind kinds[] = {
     {"IFCCIRCLE", CURVED | RADIUS},
     {"IFCCIRCLEHOLLOWPROFILEDEF", CURVED | ASSIMP_ERRS},
     {"IFCCIRCLEPROFILEDEF", CURVED | RADIUS},
-    {"IFCCSGSOLID", BODY | ASSIMP_ERRS},
+    {"IFCCSGSOLID", ASSIMP_ERRS},
     {"IFCCSHAPEPROFILEDEF", ASSIMP_ERRS},
     {"IFCCYLINDRICALSURFACE", CURVED | RADIUS},
     {"IFCELLIPSE", CURVED},
     {"IFCELLIPSEPROFILEDEF", CURVED | ASSIMP_ERRS},
-    {"IFCEXTRUDEDAREASOLID", BODY},
-    {"IFCEXTRUDEDAREASOLIDTAPERED", BODY | ASSIMP_ERRS},
-    {"IFCFACEBASEDSURFACEMODEL", BODY},
-    {"IFCFACETEDBREP", BODY},
-    {"IFCFACETEDBREPWITHVOIDS", BODY | ASSIMP_ERRS},
-    {"IFCFIXEDREFERENCESWEPTAREASOLID", BODY | CURVED | ASSIMP_ERRS},
+    {"IFCEXTRUDEDAREASOLIDTAPERED", ASSIMP_ERRS},
+    {"IFCFACETEDBREPWITHVOIDS", ASSIMP_ERRS},
+    {"IFCFIXEDREFERENCESWEPTAREASOLID", CURVED | ASSIMP_ERRS},
     {"IFCGEOMETRICREPRESENTATIONCONTEXT", STOP},
     {"IFCGEOMETRICREPRESENTATIONSUBCONTEXT", STOP},
     {"IFCINDEXEDPOLYCURVE", CURVED | ASSIMP_ERRS},
     {"IFCLSHAPEPROFILEDEF", ASSIMP_ERRS},
     {"IFCOWNERHISTORY", STOP},
-    {"IFCPOLYGONALFACESET", BODY | ASSIMP_ERRS},
+    {"IFCPOLYGONALFACESET", ASSIMP_ERRS},
     {"IFCRATIONALBSPLINECURVEWITHKNOTS", CURVED},
     {"IFCRATIONALBSPLINESURFACEWITHKNOTS", CURVED | ASSIMP_ERRS},
     {"IFCRECTANGLEHOLLOWPROFILEDEF", ASSIMP_ERRS},
-    {"IFCRECTANGULARPYRAMID", BODY | ASSIMP_ERRS},
-    {"IFCREVOLVEDAREASOLID", BODY | CURVED | TURNED},
-    {"IFCREVOLVEDAREASOLIDTAPERED", BODY | CURVED | TURNED | ASSIMP_ERRS},
-    {"IFCRIGHTCIRCULARCONE", BODY | CURVED | RADIUS | ASSIMP_ERRS},
-    {"IFCRIGHTCIRCULARCYLINDER", BODY | CURVED | RADIUS | ASSIMP_ERRS},
+    {"IFCRECTANGULARPYRAMID", ASSIMP_ERRS},
+    {"IFCREVOLVEDAREASOLID", CURVED | TURNED},
+    {"IFCREVOLVEDAREASOLIDTAPERED", CURVED | TURNED | ASSIMP_ERRS},
+    {"IFCRIGHTCIRCULARCONE", CURVED | RADIUS | ASSIMP_ERRS},
+    {"IFCRIGHTCIRCULARCYLINDER", CURVED | RADIUS | ASSIMP_ERRS},
     {"IFCROUNDEDRECTANGLEPROFILEDEF", CURVED | ASSIMP_ERRS},
-    {"IFCSECTIONEDSOLIDHORIZONTAL", BODY | ASSIMP_ERRS},
-    {"IFCSHELLBASEDSURFACEMODEL", BODY},
-    {"IFCSPHERE", BODY | CURVED | RADIUS | ASSIMP_ERRS},
+    {"IFCSECTIONEDSOLIDHORIZONTAL", ASSIMP_ERRS},
+    {"IFCSPHERE", CURVED | RADIUS | ASSIMP_ERRS},
     {"IFCSTYLEDITEM", STOP},
-    {"IFCSURFACECURVESWEPTAREASOLID", BODY | CURVED | ASSIMP_ERRS},
+    {"IFCSURFACECURVESWEPTAREASOLID", CURVED | ASSIMP_ERRS},
     {"IFCSURFACEOFREVOLUTION", CURVED | TURNED | ASSIMP_ERRS},
-    {"IFCSWEPTDISKSOLID", BODY | CURVED | RADIUS | ASSIMP_ERRS},
-    {"IFCSWEPTDISKSOLIDPOLYGONAL", BODY | CURVED | ASSIMP_ERRS},
+    {"IFCSWEPTDISKSOLID", CURVED | RADIUS | ASSIMP_ERRS},
+    {"IFCSWEPTDISKSOLIDPOLYGONAL", CURVED | ASSIMP_ERRS},
     {"IFCTOROIDALSURFACE", CURVED | ASSIMP_ERRS},
     {"IFCTRAPEZIUMPROFILEDEF", ASSIMP_ERRS},
-    {"IFCTRIANGULATEDFACESET", BODY | ASSIMP_ERRS},
-    {"IFCTRIANGULATEDIRREGULARNETWORK", BODY | ASSIMP_ERRS},
+    {"IFCTRIANGULATEDFACESET", ASSIMP_ERRS},
+    {"IFCTRIANGULATEDIRREGULARNETWORK", ASSIMP_ERRS},
     {"IFCTSHAPEPROFILEDEF", ASSIMP_ERRS},
     {"IFCUSHAPEPROFILEDEF", ASSIMP_ERRS},
     {"IFCZSHAPEPROFILEDEF", ASSIMP_ERRS},
@@ -152,7 +147,6 @@ static void keep_radius(struct ifc_records *r, const struct step_record *record)
 static void look_at(struct walk *w, const struct step_record *record, int kind)
 {
     struct ifc_product *p = w->product;
-    p->has_body |= (kind & BODY) != 0;
     p->is_curved |= (kind & CURVED) != 0;
     if ((kind & ASSIMP_ERRS) && p->assimp_wrong.n == 0) p->assimp_wrong = record->type;
     if (kind & RADIUS) keep_radius(w->r, record);
@@ -214,13 +208,11 @@ static bool walk_product(struct walk *w, struct ifc_product *product)
     w->product = product;
     w->r->stamp++;
     bool done = walk_from(w, product->shape);
-    const bool has_body = product->has_body; /* the walk also finds bodies of openings, which are not its own */
     for (size_t i = ifc_first(w->voids, w->n_voids, 2 * sizeof *w->voids, product->id);
          i < w->n_voids && w->voids[2 * i] == product->id && done; i++) {
         const struct ifc_product *opening = ifc_records_product(w->r, w->voids[2 * i + 1]);
         if (opening != NULL) done = walk_from(w, opening->shape);
     }
-    product->has_body = has_body;
     product->is_far = product->points_m > FAR_M;
     /* The axis may lie on the other side of the origin, so the radius may be twice the largest coordinate. */
     if (product->is_turned && !product->is_far) w->r->radius_m = fmax(w->r->radius_m, 2.0 * product->points_m);

@@ -13,7 +13,7 @@
 import fs from 'node:fs'
 import v8 from 'node:v8'
 
-const RESULT = 3, NOTE = 4, MAX_TEXT = 400
+const RESULT = 3, NOTE = 4, EDITS = 5, MAX_TEXT = 400
 
 function write(bytes) {
   for (let done = 0; done < bytes.length;) done += fs.writeSync(RESULT, bytes, done)
@@ -22,8 +22,23 @@ function write(bytes) {
 // For a file below this size, reading takes less time than compiling the optimised code would.
 const SMALL = 6e6
 
+// Descriptor 5 has the file's size on a line, and a line "place length text" for each part of the file that gives way
+// to a text (ifc_edits.h). The places are those of the file as it is, in their order.
+function edited(bytes, lines) {
+  const [size, ...edits] = lines.split('\n')
+  const parts = []
+  let at = 0
+  if (edits.length > 1 && bytes.length !== Number(size)) throw new Error('the file changed while it was read')
+  for (const edit of edits.slice(0, -1)) {
+    const [, place, length, text] = /^(\d+) (\d+) (.*)$/.exec(edit)
+    parts.push(bytes.subarray(at, Number(place)), Buffer.from(text, 'latin1'))
+    at = Number(place) + Number(length)
+  }
+  return parts.length > 0 ? new Uint8Array(Buffer.concat([...parts, bytes.subarray(at)])) : bytes
+}
+
 export function load(file) {
-  const bytes = new Uint8Array(fs.readFileSync(file))
+  const bytes = edited(new Uint8Array(fs.readFileSync(file)), fs.readFileSync(EDITS, 'latin1'))
   if (bytes.length < SMALL) v8.setFlagsFromString('--liftoff-only')
   return bytes
 }

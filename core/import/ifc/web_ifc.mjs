@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 // web-ifc reads an IFC file, and this program writes its bodies to descriptor 3, in the form of result.mjs.
+// Descriptor 5 gives changes to the file; it may be empty.
 //   node web_ifc.mjs FILE SEGMENTS      SEGMENTS is the number of segments of a full circle
 import { createRequire } from 'node:module'
 import { begin, end, fail, load, placed, product } from './result.mjs'

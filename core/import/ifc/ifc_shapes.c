@@ -1,0 +1,309 @@
+/* SPDX-License-Identifier: MIT */
+#include "core/import/ifc/ifc_shapes.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "core/import/ifc/ifc_product.h"
+
+enum { MAX_REPS = STEP_MAX_ARGS, MAX_DEPTH = 8 };
+
+/* IfcProductDefinitionShape(Name, Description, Representations) */
+enum { SHAPE_REPS = 2, SHAPE_ARGS };
+/* IfcShapeRepresentation(ContextOfItems, RepresentationIdentifier, RepresentationType, Items) */
+enum { REP_CONTEXT = 0, REP_NAME = 1, REP_ITEMS = 3, REP_ARGS };
+/* IfcGeometricRepresentationSubContext(ContextIdentifier, ContextType, *, *, *, *, ParentContext, TargetScale,
+ * TargetView, UserDefinedTargetView) */
+enum { VIEW_SCALE = 7, VIEW_TARGET, VIEW_NAME, VIEW_ARGS };
+
+/* The kinds of items that count in a representation. */
+enum { HAS_BOX = 1, HAS_BODY = 2 };
+
+/* The representations of the best rank are the body. */
+enum { NO_BODY, SHEET, FALLBACK, FACETS, BODY };
+
+/* Identifiers by the table of IfcShapeRepresentation in IFC 4.3, and by IfcSite in IFC2x3. */
+static const struct {
+    const char *name;
+    int rank;
+} ranks[] = {
+    {"'Body'", BODY},
+    {"'Facetation'", FACETS},
+    {"'Tessellation'", FACETS},
+    {"'SurfaceModel'", FACETS},
+    {"'Body-FallBack'", FALLBACK},
+    {"'Surface'", SHEET},
+    {"'CoG'", NO_BODY},
+    {"'Box'", NO_BODY},
+    {"'Annotation'", NO_BODY},
+    {"'Axis'", NO_BODY},
+    {"'FootPrint'", NO_BODY},
+    {"'Profile'", NO_BODY},
+    {"'Reference'", NO_BODY},
+    {"'Clearance'", NO_BODY},
+    {"'Lighting'", NO_BODY},
+    {"'SurveyPoints'", NO_BODY},
+};
+
+/* The most detailed view first; views that are not named here have the place of NOTDEFINED. */
+static const char *const views[] = {".MODEL_VIEW.",     ".NOTDEFINED.", ".USERDEFINED.",
+                                    ".SKETCH_VIEW.",    ".GRAPH_VIEW.", ".SECTION_VIEW.",
+                                    ".ELEVATION_VIEW.", ".PLAN_VIEW.",  ".REFLECTED_PLAN_VIEW."};
+enum { VIEWS = sizeof views / sizeof views[0], VIEW_NOT_DEFINED = 1 };
+
+/* Beginnings of the types of items that have no surface. */
+static const char *const thin[] = {
+    "IFCPOLYLINE",
+    "IFCINDEXEDPOLYCURVE",
+    "IFCTRIMMEDCURVE",
+    "IFCCOMPOSITECURVE",
+    "IFCGEOMETRICCURVESET",
+    "IFCBOUNDINGBOX",
+    "IFCCIRCLE",
+    "IFCELLIPSE",
+    "IFCLINE",
+    "IFCCARTESIANPOINT",
+    "IFCBSPLINECURVE",
+    "IFCRATIONALBSPLINEC",
+    "IFCANNOTATION",
+    "IFCTEXTLITERAL",
+    "IFCLIGHTSOURCE",
+    "IFCSTYLEDITEM",
+    "IFCPLANAREXTENT",
+    "IFCPLANARBOX",
+    "IFCPOINTON",
+    "IFCPOINTBY",
+    "IFCEDGE",
+    "IFCORIENTEDEDGE",
+    "IFCSUBEDGE",
+    "IFCVERTEX",
+    "IFCPOLYLOOP",
+    "IFCPATH",
+    "IFCOFFSETCURVE",
+    "IFCGRADIENTCURVE",
+    "IFCSEGMENTEDREF",
+    "IFCCURVESEGMENT",
+    "IFCPOLYNOMIALC",
+    "IFCCLOTHOID",
+    "IFCCOSINESPIRAL",
+    "IFCSINESPIRAL",
+    "IFCSECONDORDERPOLY",
+    "IFCTHIRDORDERPOLY",
+    "IFCSEVENTHORDERPOLY",
+    "IFCINTERSECTIONCURV",
+    "IFCSEAMCURVE",
+    "IFCPCURVE",
+    "IFCDEFINEDSYMBOL",
+    "IFCAXIS",
+    "IFCDIRECTION",
+    "IFCVECTOR",
+    "IFCBOUNDARYCURVE",
+    "IFCOUTERBOUNDARYC",
+    "IFCDIMENSIONCURVE",
+    "IFCPROJECTIONCURVE",
+    "IFCTERMINATORSYMB",
+    "IFCDRAUGHTINGCALL",
+};
+
+struct rep {
+    struct text_span reference, name;
+    int rank, has;
+    bool is_known; /* its name is one of the table's */
+    bool is_kept;
+    struct text_span user_view;
+    size_t view;
+    double scale;
+};
+
+struct shape {
+    struct text_span list; /* of references, without its brackets */
+    struct rep rep[MAX_REPS];
+    size_t n;
+    bool has_body, is_boxed, is_unbodied, is_level;
+};
+
+static bool is_thin(struct text_span type)
+{
+    for (size_t i = 0; i < sizeof thin / sizeof thin[0]; i++) {
+        const size_t n = strlen(thin[i]);
+        if (type.n >= n && memcmp(type.p, thin[i], n) == 0) return true;
+    }
+    return text_is(type, "IFCSURFACECURVE"); /* IfcSurfaceCurveSweptAreaSolid is a body */
+}
+
+static const struct step_record *mapped(const struct ifc_index *x, const struct step_record *item)
+{
+    /* IfcMappedItem(MappingSource, MappingTarget), IfcRepresentationMap(MappingOrigin, MappedRepresentation) */
+    struct text_span arg[2];
+    uint64_t id;
+    if (step_split(item->args, arg, 2) != 2) return NULL;
+    const struct step_record *map = ifc_index_follow(x, arg[0], "IFCREPRESENTATIONMAP");
+    if (map == NULL || step_split(map->args, arg, 2) != 2 || !step_reference(arg[1], &id)) return NULL;
+    return ifc_index_find(x, id);
+}
+
+/* Looks at a list of items, and at those of mapped items and sets: HAS_BOX, HAS_BODY, both or 0. */
+static int look_at_items(const struct ifc_index *x, struct text_span items, int depth)
+{
+    const char *p = items.p, *end = p + items.n;
+    int has = 0;
+    for (uint64_t id; !(has & HAS_BODY) && ifc_next_reference(&p, end, &id);) {
+        const struct step_record *item = ifc_index_find(x, id), *rep;
+        struct text_span arg[REP_ARGS];
+        if (item == NULL) continue;
+        if (text_is(item->type, "IFCMAPPEDITEM")) {
+            rep = depth < MAX_DEPTH ? mapped(x, item) : NULL;
+            if (rep != NULL && step_split(rep->args, arg, REP_ARGS) == REP_ARGS)
+                has |= look_at_items(x, arg[REP_ITEMS], depth + 1);
+        } else if (text_is(item->type, "IFCGEOMETRICSET")) {
+            if (depth < MAX_DEPTH) has |= look_at_items(x, item->args, depth + 1);
+        } else if (text_is(item->type, "IFCBOUNDINGBOX")) {
+            has |= HAS_BOX;
+        } else if (!is_thin(item->type)) {
+            has |= HAS_BODY;
+        }
+    }
+    return has;
+}
+
+/* A representation without a name has that of the representation which its first item maps. */
+static struct text_span name_of(const struct ifc_index *x, const struct text_span arg[REP_ARGS])
+{
+    struct text_span inner[REP_ARGS];
+    const char *p = arg[REP_ITEMS].p, *end = p + arg[REP_ITEMS].n;
+    uint64_t id;
+    if (arg[REP_NAME].n > 2 || !ifc_next_reference(&p, end, &id)) return arg[REP_NAME];
+    const struct step_record *item = ifc_index_find(x, id);
+    const struct step_record *rep = item != NULL && text_is(item->type, "IFCMAPPEDITEM") ? mapped(x, item) : NULL;
+    return rep != NULL && step_split(rep->args, inner, REP_ARGS) == REP_ARGS ? inner[REP_NAME] : arg[REP_NAME];
+}
+
+static void read_view(const struct ifc_index *x, struct text_span context, struct rep *rep)
+{
+    struct text_span arg[VIEW_ARGS];
+    rep->view = VIEW_NOT_DEFINED;
+    rep->scale = INFINITY; /* without a scale the view is good for all of them */
+    const struct step_record *sub = ifc_index_follow(x, context, "IFCGEOMETRICREPRESENTATIONSUBCONTEXT");
+    if (sub == NULL || step_split(sub->args, arg, VIEW_ARGS) != VIEW_ARGS) return;
+    for (size_t i = 0; i < VIEWS; i++)
+        if (text_is(arg[VIEW_TARGET], views[i])) rep->view = i;
+    if (!step_real(&x->text, arg[VIEW_SCALE], &rep->scale)) rep->scale = INFINITY;
+    rep->user_view = arg[VIEW_NAME];
+}
+
+static void read_rep(const struct ifc_index *x, struct text_span reference, struct rep *rep)
+{
+    struct text_span arg[REP_ARGS];
+    uint64_t id;
+    *rep = (struct rep){.reference = reference, .is_kept = true, .user_view = {"", 0}};
+    const struct step_record *record = step_reference(reference, &id) ? ifc_index_find(x, id) : NULL;
+    if (record == NULL || step_split(record->args, arg, REP_ARGS) != REP_ARGS) return;
+    rep->name = name_of(x, arg);
+    rep->rank = FACETS; /* IFC doesn't define every name */
+    for (size_t i = 0; i < sizeof ranks / sizeof ranks[0]; i++) {
+        if (rep->name.n != strlen(ranks[i].name) || strncasecmp(rep->name.p, ranks[i].name, rep->name.n) != 0) continue;
+        rep->rank = ranks[i].rank;
+        rep->is_known = true;
+    }
+    rep->has = look_at_items(x, arg[REP_ITEMS], 0);
+    read_view(x, arg[REP_CONTEXT], rep);
+}
+
+/* Returns whether the list could be read whole. */
+static bool read_shape(const struct ifc_index *x, uint64_t id, struct shape *s)
+{
+    struct text_span arg[SHAPE_ARGS], reference[MAX_REPS];
+    const struct step_record *record = ifc_index_find(x, id);
+    s->n = 0;
+    s->has_body = s->is_boxed = s->is_unbodied = s->is_level = false;
+    if (record == NULL || step_split(record->args, arg, SHAPE_ARGS) != SHAPE_ARGS ||
+        !step_list(arg[SHAPE_REPS], &s->list))
+        return false;
+    const size_t n = step_split(s->list, reference, MAX_REPS);
+    if (n > MAX_REPS) return false;
+    for (s->n = 0; s->n < n; s->n++)
+        read_rep(x, reference[s->n], &s->rep[s->n]);
+    return true;
+}
+
+static bool is_same_name(const struct rep *a, const struct rep *b)
+{
+    return a->name.n == b->name.n && strncasecmp(a->name.p, b->name.p, a->name.n) == 0;
+}
+
+static bool is_same_view(const struct rep *a, const struct rep *b)
+{
+    return a->view == b->view && !(a->scale < b->scale) && !(a->scale > b->scale) && a->user_view.n == b->user_view.n &&
+           memcmp(a->user_view.p, b->user_view.p, a->user_view.n) == 0;
+}
+
+/* Where bodies of one name are for several views, the best view stays: the model's, and that of the largest scale.
+ * Bodies of one name and one view are parts of one body. */
+static void choose_views(struct shape *s)
+{
+    for (size_t i = 0; i < s->n; i++) {
+        const struct rep *best = &s->rep[i];
+        if (!best->is_kept || best->has < HAS_BODY) continue;
+        for (size_t k = 0; k < s->n; k++) {
+            const struct rep *rep = &s->rep[k];
+            if (!rep->is_kept || rep->has < HAS_BODY || !is_same_name(rep, best)) continue;
+            if (rep->view < best->view || (rep->view == best->view && rep->scale > best->scale)) best = rep;
+        }
+        for (size_t k = 0; k < s->n; k++) {
+            struct rep *rep = &s->rep[k];
+            if (rep->has < HAS_BODY || !is_same_name(rep, best) || is_same_view(rep, best)) continue;
+            rep->is_kept = false;
+            s->is_level = true;
+        }
+    }
+}
+
+static void choose_reps(struct shape *s)
+{
+    int best = NO_BODY, has = 0;
+    for (size_t i = 0; i < s->n; i++) {
+        has |= s->rep[i].has;
+        if (s->rep[i].has >= HAS_BODY && s->rep[i].rank > best) best = s->rep[i].rank;
+    }
+    for (size_t i = 0; i < s->n; i++) {
+        struct rep *rep = &s->rep[i];
+        if (rep->has < HAS_BODY) continue; /* neither reader builds it */
+        rep->is_kept = !rep->is_known || (rep->rank == best && best > NO_BODY);
+    }
+    choose_views(s);
+    s->has_body = best > NO_BODY;
+    s->is_boxed = has == HAS_BOX;
+    s->is_unbodied = best == NO_BODY && has >= HAS_BODY;
+}
+
+static bool take_out(struct ifc_index *x, const struct shape *s, struct ifc_edits *edits)
+{
+    struct text_span kept[MAX_REPS];
+    size_t n = 0;
+    for (size_t i = 0; i < s->n; i++)
+        if (s->rep[i].is_kept) kept[n++] = s->rep[i].reference;
+    return n == s->n || ifc_edits_keep(edits, &x->text, s->list, kept, n);
+}
+
+int ifc_shapes_choose(struct ifc_index *x, struct ifc_product *product, size_t n_products, struct ifc_edits *edits,
+                      struct sh_err *err)
+{
+    struct shape s;
+    for (size_t i = 0; i < n_products; i++) {
+        struct ifc_product *p = &product[i];
+        const bool is_whole = read_shape(x, p->shape, &s);
+        choose_reps(&s);
+        p->has_body = s.has_body || !is_whole;
+        p->is_boxed = s.is_boxed;
+        p->is_unbodied = s.is_unbodied;
+        p->is_level = s.is_level;
+    }
+    /* Products may share a shape, so shapes change only after all products have been looked at. A shape that was
+     * changed has nothing more to take out. */
+    for (size_t i = 0; i < n_products; i++) {
+        if (!read_shape(x, product[i].shape, &s)) continue;
+        choose_reps(&s);
+        if (!take_out(x, &s, edits)) return ifc_no_memory(x, err);
+    }
+    return SH_OK;
+}
