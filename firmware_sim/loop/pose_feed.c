@@ -16,6 +16,7 @@
 #include "drivers/socket/socket.h"
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/config/config.h"
+#include "firmware_sim/device/pose_line.h"
 
 enum { DATAGRAM = 65536 };
 
@@ -30,21 +31,6 @@ struct pose_feed {
     char text[DATAGRAM + 1];
 };
 
-/* One line as time and x, y, z, roll, pitch, heading. 0, or -1 when it is malformed. */
-static int parse_line(const char *line, double v[7])
-{
-    static const double most[7] = {1e9, 1e9, 1e9, 1e9, 360.0, 90.0, 360.0};
-    for (int i = 0; i < 7; i++) {
-        char *end;
-        v[i] = strtod(line, &end);
-        if (end == line || !(fabs(v[i]) <= most[i])) return -1;
-        line = end + strspn(end, " \t");
-        if (i < 6 && *line == ',') line++;
-        if (i < 6 && line == end) return -1;
-    }
-    return line[strspn(line, " \t\r")] == '\0' ? 0 : -1;
-}
-
 static void report_bad(struct pose_feed *feed, const char *what)
 {
     int64_t now_ns = clock_now_ns();
@@ -55,12 +41,12 @@ static void report_bad(struct pose_feed *feed, const char *what)
 
 static void pose_feed_take_line(struct pose_feed *feed, const char *line)
 {
-    double v[7];
+    double t_s, v[6];
     if (line[strspn(line, " \t\r")] == '\0') return;
-    if (parse_line(line, v) != 0) {
+    if (pose_line_read_timed(line, &t_s, v) != 0) {
         atomic_fetch_add(&device_counters(feed->device)->bad_poses, 1);
         report_bad(feed, "a pose is not of the form t_s x y z roll pitch heading");
-    } else if (device_pose(feed->device, llround(1e9 * v[0]), v + 1) != 0) {
+    } else if (device_pose(feed->device, llround(1e9 * t_s), v) != 0) {
         char text[96];
         snprintf(text, sizeof text, "a pose is over %g m from the station, not after the last pose, or over 1 h ahead",
                  feed->reach_m);

@@ -132,6 +132,11 @@ static void these_lines_are_none(void **state)
                {",1.5 1 2 3 4 5 6", 0},
                {"T x 2 3 4 5 6", 0},
                {"T 1 2 nan 4 5 6", 0},
+               {"T 0x1 2 3 4 5 6", 0}, /* decimal numbers alone, as TIME:STEP takes them */
+               {"0x10 1 2 3 4 5 6", 0},
+               {"T 1 2 3 4 5 0x1p2", 0},
+               {"T 1 2 3 4 5 1e", 0},
+               {"T 1 2 3 4 5 1e999", 0},
                {"inf 1 2 3 4 5 6", 0},
                {"T 1 2 3 360.01 5 6", 0},
                {"T 1 2 3 4 90.01 6", 0},
