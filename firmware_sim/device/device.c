@@ -149,6 +149,7 @@ int device_create(const struct site *site, const struct device_options *options,
     if (rc == SH_OK) rc = device_open_moves(&device->moves, device->site, err);
     if (rc == SH_OK) rc = set_up_commands(device, err);
     if (rc == SH_OK) rc = check_live(device, err);
+    if (rc == SH_OK) rc = device_open_poses(device, err);
     if (rc == SH_OK) rc = head_clock_create(&site->cfg->time, &device->clock, err);
     gnss_init(&device->gnss, site, &device->clock);
     device_init_time_server(device);
@@ -215,6 +216,7 @@ void device_free(struct device *device)
     device_free_variants(&device->variants);
     free(device->journal.replay);
     free(device->station_scans);
+    free(device->live.sample);
     device_close_moves(&device->moves);
     pthread_mutex_destroy(&device->lock);
     free(device);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The head's pose: the end of a trajectory, and a live platform's poses. */
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "core/angle.h"
@@ -10,6 +11,8 @@
 
 #define LEN(array) ((int64_t)(sizeof(array) / sizeof((array)[0])))
 
+static const int64_t PAST_NS = 2000000000; /* a fix of the receiver is of a time up to so long ago */
+
 int64_t device_path_end_ns(const struct device *device)
 {
     const struct site *site = device->site;
@@ -17,9 +20,16 @@ int64_t device_path_end_ns(const struct device *device)
     return site->knot[site->n_knots - 1].t_ns;
 }
 
-static const struct device_sample *sample_at(const struct device_live *live, uint64_t i)
+int device_open_poses(struct device *device, struct sh_err *err)
 {
-    return &live->sample[i % LEN(live->sample)];
+    if (device->site->cfg->platform.kind != PLATFORM_LIVE) return SH_OK;
+    device->live.sample = calloc(DEVICE_POSES_KEPT, sizeof *device->live.sample);
+    return device->live.sample != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory for the platform's poses");
+}
+
+static struct device_sample *sample_at(const struct device_live *live, uint64_t i)
+{
+    return &live->sample[i % DEVICE_POSES_KEPT];
 }
 
 static int is_near(const struct device *device, const struct pose *pose)
@@ -36,18 +46,40 @@ static int is_early(const struct device *device, int64_t t_ns)
     return device->site->cfg->loop.pace != PACE_STEP && t_ns > now_ns + DEVICE_POSE_AHEAD_S * INT64_C(1000000000);
 }
 
-int device_pose(struct device *device, int64_t t_ns, const double v[6])
+/* Whether one more pose leaves those that are still needed: by pulses that are not claimed yet, and by fixes. */
+static int has_room(const struct device *device)
+{
+    const struct device_live *live = &device->live;
+    if (live->n < DEVICE_POSES_KEPT) return 1;
+    const uint64_t tick = device->scan.on ? device->scan.tick0 + (uint64_t)live->next : device->next_tick;
+    const int64_t oldest_ns = sample_at(live, live->n - DEVICE_POSES_KEPT + 1)->t_ns; /* once the new one is there */
+    return oldest_ns <= (int64_t)tick * device->tick_ns - PAST_NS;
+}
+
+static int check_pose(const struct device *device, int64_t t_ns, const struct pose *pose, struct sh_err *err)
+{
+    const struct device_live *live = &device->live;
+    const int64_t last_ns = live->n != 0 ? sample_at(live, live->n - 1)->t_ns : INT64_MIN;
+    if (!is_near(device, pose))
+        return sh_fail(err, SH_EINPUT, "a pose is over %g m from the station", device->site->cfg->platform.reach_m);
+    if (t_ns <= last_ns)
+        return sh_fail(err, SH_EINPUT, "a pose is not after the last pose, of %.9g s", 1e-9 * (double)last_ns);
+    if (is_early(device, t_ns)) return sh_fail(err, SH_EINPUT, "a pose is over %d s ahead", DEVICE_POSE_AHEAD_S);
+    if (has_room(device)) return SH_OK;
+    return sh_fail(err, SH_EINPUT, "a pose has no room: %d of them are ahead", DEVICE_POSES_KEPT);
+}
+
+int device_pose(struct device *device, int64_t t_ns, const double v[6], struct sh_err *err)
 {
     struct device_live *live = &device->live;
     struct pose pose = {.position_m = {v[0], v[1], v[2]}};
     pose_from_angles(angle_rad(v[5]), angle_rad(v[4]), angle_rad(v[3]), pose.quat);
     pthread_mutex_lock(&device->lock);
-    int bad = (live->n != 0 && t_ns <= sample_at(live, live->n - 1)->t_ns) || !is_near(device, &pose) ||
-              is_early(device, t_ns);
-    if (!bad) live->sample[live->n++ % LEN(live->sample)] = (struct device_sample){t_ns, pose};
+    const int rc = check_pose(device, t_ns, &pose, err);
+    if (rc == SH_OK) *sample_at(live, live->n++) = (struct device_sample){t_ns, pose};
     pthread_mutex_unlock(&device->lock);
-    if (bad) atomic_fetch_add(&device->counters.bad_poses, 1);
-    return bad;
+    if (rc != SH_OK) atomic_fetch_add(&device->counters.bad_poses, 1);
+    return rc;
 }
 
 /* After the last pose the motion between the last two poses goes on for extrapolate_ms. Then the platform stands. Where
@@ -70,28 +102,41 @@ static uint32_t extrapolate(const struct device *device, int64_t t_ns, struct po
     return flags;
 }
 
+/* Returns the last of the poses from `first` on that is at t_ns or before. The first one is. */
+static uint64_t find_sample(const struct device_live *live, uint64_t first, int64_t t_ns)
+{
+    uint64_t low = first, high = live->n;
+    while (high - low > 1) {
+        const uint64_t middle = low + (high - low) / 2;
+        if (sample_at(live, middle)->t_ns <= t_ns)
+            low = middle;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+/* POSE_NONE: there is no pose of that time or before, and `out` is not set. */
 static uint32_t platform_at(const struct device *device, int64_t t_ns, struct pose *out)
 {
     const struct device_live *live = &device->live;
-    uint64_t kept = live->n < (uint64_t)LEN(live->sample) ? live->n : (uint64_t)LEN(live->sample);
-    if (t_ns > sample_at(live, live->n - 1)->t_ns) return extrapolate(device, t_ns, out);
-    for (uint64_t i = live->n - 1; i + kept > live->n; i--) {
-        int64_t a_ns = sample_at(live, i - 1)->t_ns, b_ns = sample_at(live, i)->t_ns;
-        if (t_ns < a_ns) continue;
-        pose_between(&sample_at(live, i - 1)->pose, &sample_at(live, i)->pose,
-                     (double)(t_ns - a_ns) / (double)(b_ns - a_ns), out);
-        return 0;
-    }
-    *out = sample_at(live, live->n - kept)->pose; /* t_ns is before all poses that are still here */
+    const uint64_t first = live->n > DEVICE_POSES_KEPT ? live->n - DEVICE_POSES_KEPT : 0;
+    if (live->n == 0 || t_ns < sample_at(live, first)->t_ns) return POSE_NONE;
+    const uint64_t i = find_sample(live, first, t_ns);
+    const struct device_sample *a = sample_at(live, i), *b = sample_at(live, i + 1);
+    *out = a->pose;
+    if (t_ns == a->t_ns) return 0;
+    if (i + 1 == live->n) return extrapolate(device, t_ns, out);
+    pose_between(&a->pose, &b->pose, (double)(t_ns - a->t_ns) / (double)(b->t_ns - a->t_ns), out);
     return 0;
 }
 
-/* Finds the pose of the head on the platform. Returns the pose's flags. */
+/* Finds the pose of the head on the platform. Returns the pose's flags; with POSE_NONE `head` is not set. */
 static uint32_t live_head_at(const struct device *device, int64_t t_ns, struct pose *head)
 {
     struct pose body;
     uint32_t flags = platform_at(device, t_ns, &body);
-    pose_mount(&body, &device->site->mount, head);
+    if (flags != POSE_NONE) pose_mount(&body, &device->site->mount, head);
     return flags;
 }
 
@@ -109,29 +154,24 @@ static void on_path(const struct site *site, int64_t t_ns, struct pose *out)
 int device_head_pose(struct device *device, int64_t t_ns, struct pose *head)
 {
     const struct site *site = device->site;
-    if (!site->moving || (site->n_knots == 0 && device->live.n == 0)) return 0;
+    if (!site->moving) return 0;
     if (site->n_knots != 0) {
         int64_t start_ns = (int64_t)device->scan.tick0 * device->tick_ns;
         int64_t end_ns = device->scan.on ? t_ns : (int64_t)device->scan.end_tick * device->tick_ns;
         on_path(site, device->scan.number == 0 ? 0 : (t_ns < end_ns ? t_ns : end_ns) - start_ns, head);
         return 1;
     }
-    live_head_at(device, t_ns, head);
-    return 1;
+    return live_head_at(device, t_ns, head) != POSE_NONE;
 }
 
 static void make_knot(struct device *device, int64_t t_ns, struct pose_knot *knot)
 {
-    const struct site *site = device->site;
+    const struct placement *at = &device->site->station[device->scan.station].at;
     *knot = (struct pose_knot){.t_ns = t_ns};
-    if (device->live.n == 0) {
-        const struct placement *at = &site->station[device->scan.station].at;
-        memcpy(knot->pose.position_m, at->position_m, sizeof at->position_m);
-        pose_from_matrix(at->rotation, knot->pose.quat);
-        knot->flags = POSE_NONE;
-        return;
-    }
     knot->flags = live_head_at(device, (int64_t)device->scan.tick0 * device->tick_ns + t_ns, &knot->pose);
+    if (knot->flags != POSE_NONE) return;
+    memcpy(knot->pose.position_m, at->position_m, sizeof at->position_m);
+    pose_from_matrix(at->rotation, knot->pose.quat);
 }
 
 /* Adds the event once per episode: a second without a late pose ends an episode. */
@@ -140,14 +180,14 @@ static void count_late(struct device *device, const struct pose_knot *knot, stru
     struct device_live *live = &device->live;
     if ((knot->flags & (POSE_LATE | POSE_NONE)) == 0) return;
     uint64_t n = atomic_fetch_add(&device->counters.late_poses, 1) + 1;
-    int64_t since_ns =
-        live->n == 0 ? 0
-                     : (int64_t)device->scan.tick0 * device->tick_ns + knot->t_ns - sample_at(live, live->n - 1)->t_ns;
+    const int is_none = knot->flags == POSE_NONE;
+    const int64_t at_ns = (int64_t)device->scan.tick0 * device->tick_ns + knot->t_ns;
+    const int64_t since_ns = is_none ? 0 : at_ns - sample_at(live, live->n - 1)->t_ns;
     if (live->said_tick == 0 || work->tick - live->said_tick > device->tick_hz) {
         char text[96];
         snprintf(text, sizeof text,
-                 live->n == 0 ? "no pose yet: the head is assumed to be at the station"
-                              : "no pose came in time: the platform is assumed to stand");
+                 is_none ? "no pose yet: the head is assumed to be at the station"
+                         : "no pose came in time: the platform is assumed to stand");
         device_push_event(&device->events, NATIVE_EV_POSE_LATE, n, 0, (uint64_t)since_ns, text);
     }
     live->said_tick = work->tick;

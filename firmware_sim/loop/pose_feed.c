@@ -22,7 +22,6 @@ enum { DATAGRAM = 65536 };
 
 struct pose_feed {
     struct device *device;
-    double reach_m; /* from the station */
     int fd, stop_fd;
     char endpoint[96];
     pthread_t thread;
@@ -42,15 +41,13 @@ static void report_bad(struct pose_feed *feed, const char *what)
 static void pose_feed_take_line(struct pose_feed *feed, const char *line)
 {
     double t_s, v[6];
+    struct sh_err err;
     if (line[strspn(line, " \t\r")] == '\0') return;
     if (pose_line_read_timed(line, &t_s, v) != 0) {
         atomic_fetch_add(&device_counters(feed->device)->bad_poses, 1);
         report_bad(feed, "a pose is not of the form t_s x y z roll pitch heading");
-    } else if (device_pose(feed->device, llround(1e9 * t_s), v) != 0) {
-        char text[96];
-        snprintf(text, sizeof text, "a pose is over %g m from the station, not after the last pose, or over 1 h ahead",
-                 feed->reach_m);
-        report_bad(feed, text);
+    } else if (device_pose(feed->device, llround(1e9 * t_s), v, &err) != SH_OK) {
+        report_bad(feed, err.text);
     }
 }
 
@@ -112,7 +109,6 @@ int pose_feed_open(struct device *device, const struct config *cfg, struct pose_
     struct pose_feed *feed = calloc(1, sizeof *feed);
     if (feed == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     feed->device = device;
-    feed->reach_m = cfg->platform.reach_m;
     feed->fd = -1;
     feed->stop_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     int rc = feed->stop_fd < 0 ? sh_fail(err, SH_EIO, "eventfd: %s", strerror(errno)) : SH_OK;
