@@ -122,6 +122,7 @@ static void do_command(struct device *device, uint32_t session, const char *line
     cmd->t_ns = (int64_t)released * device->tick_ns;
     device->desk.now_ns = (int64_t)device->next_tick * device->tick_ns;
     cmd->fixed = why_fixed(device, session);
+    memcpy(cmd->pose_centre_m, device_reach_centre(device), sizeof cmd->pose_centre_m);
     /* HEAD:STORe of a journal (session 0) is not refused, though a replay stores nothing. */
     cmd->keeps = session == 0 || device->settings != NULL;
     cmd->lost_journal_lines = atomic_load(&device->counters.lost_journal_lines);

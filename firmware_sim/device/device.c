@@ -45,7 +45,6 @@ static int set_up_commands(struct device *device, struct sh_err *err)
     device->cmd.plan = device->plan;
     device->cmd.step_allowed = cfg->loop.pace == PACE_STEP;
     device->cmd.pose_allowed = cfg->platform.kind == PLATFORM_LIVE;
-    memcpy(device->cmd.pose_centre_m, device->site->station[0].at.position_m, sizeof device->cmd.pose_centre_m);
     device->cmd.pose_reach_m = cfg->platform.reach_m;
     device->cmd.fixed = site_why_fixed(device->site);
     device->cmd.place = device->moves.place;

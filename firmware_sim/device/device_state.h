@@ -178,6 +178,9 @@ int64_t device_path_end_ns(const struct device *device);
 /* The head's pose at a device time; 0: it stands at its station. A trajectory runs from the start of the
  * last scan to its end; then the platform stands there until the next scan begins. */
 int device_head_pose(struct device *device, int64_t t_ns, struct pose *head);
+/* The place that a live platform stays within platform.reach_m of: the station of the scan that is on, or of the next
+ * one. */
+const double *device_reach_centre(const struct device *device);
 /* Makes room for the poses of a live platform; does nothing for other ones. device_free frees it. */
 int device_open_poses(struct device *device, struct sh_err *err);
 /* Gives the work the poses that a live head has at the work's pulses. */

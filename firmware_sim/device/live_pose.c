@@ -32,9 +32,15 @@ static struct device_sample *sample_at(const struct device_live *live, uint64_t 
     return &live->sample[i % DEVICE_POSES_KEPT];
 }
 
+const double *device_reach_centre(const struct device *device)
+{
+    const uint32_t station = device->scan.on ? device->scan.station : device->cmd.settings.station - 1;
+    return device->site->station[station].at.position_m;
+}
+
 static int is_near(const struct device *device, const struct pose *pose)
 {
-    double off_m = vec3_distance(pose->position_m, device->site->station[0].at.position_m);
+    double off_m = vec3_distance(pose->position_m, device_reach_centre(device));
     return off_m <= device->site->cfg->platform.reach_m;
 }
 
@@ -116,7 +122,8 @@ static uint64_t find_sample(const struct device_live *live, uint64_t first, int6
     return low;
 }
 
-/* POSE_NONE: there is no pose of that time or before, and `out` is not set. */
+/* POSE_NONE: there is no pose of that time or before, and `out` is not set. Poses that came while the head was at
+ * another station, and are out of reach of this one, don't count. */
 static uint32_t platform_at(const struct device *device, int64_t t_ns, struct pose *out)
 {
     const struct device_live *live = &device->live;
@@ -124,9 +131,11 @@ static uint32_t platform_at(const struct device *device, int64_t t_ns, struct po
     if (live->n == 0 || t_ns < sample_at(live, first)->t_ns) return POSE_NONE;
     const uint64_t i = find_sample(live, first, t_ns);
     const struct device_sample *a = sample_at(live, i), *b = sample_at(live, i + 1);
+    if (!is_near(device, &a->pose)) return POSE_NONE;
     *out = a->pose;
     if (t_ns == a->t_ns) return 0;
     if (i + 1 == live->n) return extrapolate(device, t_ns, out);
+    if (!is_near(device, &b->pose)) return POSE_NONE;
     pose_between(&a->pose, &b->pose, (double)(t_ns - a->t_ns) / (double)(b->t_ns - a->t_ns), out);
     return 0;
 }

@@ -142,6 +142,34 @@ static void a_live_platform_goes_on_for_a_while(void **state)
     rig_close(rig);
 }
 
+/* Two stations, 5 m apart, and a reach of 4 m: it counts from the station that the head is at, for poses and for those
+ * of TIME:STEP. A pose that came at the other station and is out of reach of this one does not count. */
+static void the_reach_is_that_of_the_heads_station(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"platform.kind=live", "platform.reach_m=4",
+                                       "stations[1].name=b", "stations[1].position_m=[5,0,0]",
+                                       "head.station=2",     "loop.pace=step"};
+    struct rig *rig = rig_open(NULL, sets, 6);
+    struct command_result result;
+    struct pose pose;
+    rig_go_to(rig, 300);
+    assert_int_equal(device_pose(rig->device, 10000000, (double[6]){8}, NULL), SH_OK);
+    assert_int_equal(device_pose(rig->device, 20000000, (double[6]){0}, NULL), SH_EINPUT);
+    rig_tell(rig, "TIME:STEP 1 MS, 5,0,0,0,0,0", rig->next - 1);
+    device_command(rig->device, 1, "TIME:STEP 1 MS, 0,0,0,0,0,0", rig->next - 1, &result);
+    assert_int_equal(result.error, CMD_E_RANGE);
+    assert_int_equal(device_head_pose(rig->device, 15000000, &pose), 1);
+    rig_tell(rig, "HEAD:STATION 1", rig->next - 1);
+    assert_int_equal(device_head_pose(rig->device, 15000000, &pose), 0);
+    rig_tell(rig, "TIME:STEP 1 MS, 0,0,0,0,0,0", rig->next - 1);
+    assert_int_equal(device_pose(rig->device, 20000000, (double[6]){0}, NULL), SH_OK);
+    assert_int_equal(device_pose(rig->device, 30000000, (double[6]){5}, NULL), SH_EINPUT);
+    assert_int_equal(device_head_pose(rig->device, 15000000, &pose), 0); /* between the two */
+    assert_int_equal(device_head_pose(rig->device, 20000000, &pose), 1);
+    rig_close(rig);
+}
+
 /* Gives `n` poses, 1 ms apart, from `from_ms` on: north at 1 m/s. Returns how many were taken. */
 static int ride(struct rig *rig, int from_ms, int n)
 {
@@ -297,6 +325,7 @@ int main(void)
         cmocka_unit_test(a_path_ends_with_its_last_pose),
         cmocka_unit_test(a_live_platform_goes_on_for_a_while),
         cmocka_unit_test(poses_come_in_order),
+        cmocka_unit_test(the_reach_is_that_of_the_heads_station),
         cmocka_unit_test(no_pose_is_lost_before_its_time),
         cmocka_unit_test(no_pose_is_used_before_its_time),
         cmocka_unit_test(a_fix_is_where_the_head_was),
