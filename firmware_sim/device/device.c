@@ -64,6 +64,7 @@ static int open_replay(struct device *device, struct sh_err *err)
     int rc = journal_read(device->options.replay, &journal->replay, &journal->n_replay, err);
     if (rc != SH_OK) return rc;
     for (size_t i = 0; i < journal->n_replay && !journal->ends; i++) {
+        journal->has_poses |= journal_pose(&journal->replay[i]) != NULL;
         if (!journal_is_end(&journal->replay[i])) continue;
         end_run_at(device, journal->replay[i].tick);
         journal->n_replay = i; /* commands after the end had no effect */

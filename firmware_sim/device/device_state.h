@@ -68,6 +68,7 @@ struct device_journal {
     struct journal_entry *replay;
     size_t n_replay, at; /* next entry to carry out */
     int ends;            /* the replayed one has an end */
+    int has_poses;       /* and poses of a live platform */
     uint64_t end_tick;   /* where the run at hand ended, once it is over */
     size_t n_refused;    /* commands of the replayed one; the first of them, and its reply: */
     const struct journal_entry *refused;
@@ -183,6 +184,10 @@ int device_head_pose(struct device *device, int64_t t_ns, struct pose *head);
 const double *device_reach_centre(const struct device *device);
 /* Makes room for the poses of a live platform; does nothing for other ones. device_free frees it. */
 int device_open_poses(struct device *device, struct sh_err *err);
+/* Takes a pose of the replayed journal. *out has the error. */
+void device_replay_pose(struct device *device, const struct journal_entry *entry, struct command_result *out);
+/* Whether poses come from the journal that is being replayed, so that no others are taken. */
+int device_replays_poses(const struct device *device);
 /* Gives the work the poses that a live head has at the work's pulses. */
 void device_take_poses(struct device *device, struct device_work *work);
 

@@ -8,6 +8,7 @@
 #include "core/vec3.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/device/device_state.h"
+#include "firmware_sim/device/pose_line.h"
 
 #define LEN(array) ((int64_t)(sizeof(array) / sizeof((array)[0])))
 
@@ -70,22 +71,62 @@ static int check_pose(const struct device *device, int64_t t_ns, const struct po
         return sh_fail(err, SH_EINPUT, "a pose is over %g m from the station", device->site->cfg->platform.reach_m);
     if (t_ns <= last_ns)
         return sh_fail(err, SH_EINPUT, "a pose is not after the last pose, of %.9g s", 1e-9 * (double)last_ns);
+    if (t_ns < 0) return sh_fail(err, SH_EINPUT, "a pose is before power-up; allowed is 0 s on");
     if (is_early(device, t_ns)) return sh_fail(err, SH_EINPUT, "a pose is over %d s ahead", DEVICE_POSE_AHEAD_S);
     if (has_room(device)) return SH_OK;
     return sh_fail(err, SH_EINPUT, "a pose has no room: %d of them are ahead", DEVICE_POSES_KEPT);
 }
 
-int device_pose(struct device *device, int64_t t_ns, const double v[6], struct sh_err *err)
+static int take_pose(struct device *device, int64_t t_ns, const double v[6], struct sh_err *err)
 {
     struct device_live *live = &device->live;
     struct pose pose = {.position_m = {v[0], v[1], v[2]}};
     pose_from_angles(angle_rad(v[5]), angle_rad(v[4]), angle_rad(v[3]), pose.quat);
-    pthread_mutex_lock(&device->lock);
     const int rc = check_pose(device, t_ns, &pose, err);
-    if (rc == SH_OK) *sample_at(live, live->n++) = (struct device_sample){t_ns, pose};
+    if (rc != SH_OK) {
+        atomic_fetch_add(&device->counters.bad_poses, 1);
+        return rc;
+    }
+    *sample_at(live, live->n++) = (struct device_sample){t_ns, pose};
+    /* Poses are made of this one from the next claim on, so a replay gives it before that claim. */
+    if (device->journal.out != NULL) journal_write_pose(device->journal.out, device->next_tick, t_ns, v);
+    return SH_OK;
+}
+
+int device_replays_poses(const struct device *device)
+{
+    return device->journal.has_poses && device->journal.at < device->journal.n_replay;
+}
+
+int device_pose(struct device *device, int64_t t_ns, const double v[6], struct sh_err *err)
+{
+    int rc;
+    pthread_mutex_lock(&device->lock);
+    if (device_replays_poses(device)) {
+        rc = sh_fail(err, SH_EINPUT, "a pose came while a journal with poses is being replayed");
+        atomic_fetch_add(&device->counters.bad_poses, 1);
+    } else {
+        rc = take_pose(device, t_ns, v, err);
+    }
     pthread_mutex_unlock(&device->lock);
-    if (rc != SH_OK) atomic_fetch_add(&device->counters.bad_poses, 1);
     return rc;
+}
+
+void device_replay_pose(struct device *device, const struct journal_entry *entry, struct command_result *out)
+{
+    double v[6];
+    struct sh_err err;
+    int rc;
+    memset(out, 0, sizeof *out);
+    if (device->live.sample == NULL)
+        rc = sh_fail(&err, SH_EINPUT, "a pose needs platform.kind: live");
+    else if (pose_line_read(journal_pose(entry), v) != 0)
+        rc = sh_fail(&err, SH_EINPUT, "a pose is x y z roll pitch heading");
+    else
+        rc = take_pose(device, entry->t_ns, v, &err);
+    if (rc == SH_OK) return;
+    out->error = CMD_E_SETTINGS;
+    snprintf(out->reply, sizeof out->reply, "%.200s", err.text);
 }
 
 /* After the last pose the motion between the last two poses goes on for extrapolate_ms. Then the platform stands. Where

@@ -236,6 +236,68 @@ static void no_pose_is_used_before_its_time(void **state)
     rig_close(rig);
 }
 
+enum { RIDE_TICKS = 500, RIDE_POSES = 4 }; /* poses of the head in a tick */
+
+/* A ride of RIDE_TICKS ticks with commands and, unless a journal has them, poses: some are given a moment ahead, some
+ * are refused. Keeps the head's poses of each tick. */
+static void make_ride(const struct device_options *options, int gives, struct pose_knot knot[][RIDE_POSES])
+{
+    static const char *const sets[] = {"platform.kind=live", "platform.reach_m=5", "head.frames=0", "loop.pace=step"};
+    struct rig *rig = rig_open(options, sets, 4);
+    memset(knot, 0, RIDE_TICKS * sizeof *knot);
+    for (int i = 0; i < RIDE_TICKS; i++) {
+        const double t = 1e-3 * i, v[6] = {t / 3.0, sin(t), i == 350 ? 9.0 : -0.0, 1e-17 * i, -50.0 * t, 100.0 * t};
+        if (gives && i % 7 == 0) device_pose(rig->device, (i + i % 3) * INT64_C(1000000) + 123, v, NULL);
+        if (gives && i == 300) rig_tell(rig, "HEAD:PRR 50000", rig->next - 1);
+        assert_true(rig_claim(rig) && rig->work.n_poses <= RIDE_POSES);
+        memcpy(knot[i], rig->work.pose, rig->work.n_poses * sizeof **knot);
+    }
+    struct sh_err err;
+    need(device_close_journal(rig->device, &err), &err);
+    rig_close(rig);
+}
+
+/* Poses are in the journal to the last bit, with the tick that they were there for. */
+static void a_replay_has_the_poses(void **state)
+{
+    (void)state;
+    static struct pose_knot once[RIDE_TICKS][RIDE_POSES], again[RIDE_TICKS][RIDE_POSES];
+    make_ride(&(struct device_options){.start = 1, .journal = journal_path}, 1, once);
+    make_ride(&(struct device_options){.start = 1, .replay = journal_path}, 0, again);
+    assert_true(once[RIDE_TICKS - 1][0].pose.position_m[0] > 0.1);
+    assert_memory_equal(again, once, sizeof once);
+}
+
+/* While a journal with poses is replayed, no others are taken; after its last line they are. A journal without poses,
+ * as earlier heads wrote it, leaves them to the peer. */
+static void a_replay_takes_no_other_poses(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"platform.kind=live", "loop.pace=step"};
+    static const char *const lines[] = {"0 1000000 0 POSE 1 0 0 0 0 0\n20 9000000 1 HEAD:LINES 50\n",
+                                        "20 9000000 1 HEAD:LINES 50\n"};
+    const double v[6] = {2};
+    for (int i = 0; i < 2; i++) {
+        struct command_result result;
+        struct sh_err err;
+        FILE *f = fopen(journal_path, "w");
+        assert_non_null(f);
+        fprintf(f, "# scanhead journal 1\n%s", lines[i]);
+        assert_int_equal(fclose(f), 0);
+        struct rig *rig = rig_open(&(struct device_options){.replay = journal_path}, sets, 2);
+        rig_go_to(rig, 10);
+        assert_int_equal(device_pose(rig->device, 5000000, v, &err), i == 0 ? SH_EINPUT : SH_OK);
+        if (i == 0) assert_string_equal(err.text, "a pose came while a journal with poses is being replayed");
+        device_command(rig->device, 1, "TIME:STEP 1 MS, 1,0,0,0,0,0", 9, &result);
+        assert_int_equal(result.error, i == 0 ? CMD_E_SETTINGS : 0);
+        rig_tell(rig, "TIME:STEP 1 MS", 9);
+        rig_go_to(rig, 30);
+        assert_int_equal(device_pose(rig->device, 6000000, v, NULL), SH_OK);
+        rig_tell(rig, "TIME:STEP 1 MS, 1,0,0,0,0,0", 29);
+        rig_close(rig);
+    }
+}
+
 /* There is one pose for a time. A pose is refused where it is older than the newest one, or beyond platform.reach_m. */
 static void poses_come_in_order(void **state)
 {
@@ -325,6 +387,8 @@ int main(void)
         cmocka_unit_test(a_path_ends_with_its_last_pose),
         cmocka_unit_test(a_live_platform_goes_on_for_a_while),
         cmocka_unit_test(poses_come_in_order),
+        cmocka_unit_test(a_replay_has_the_poses),
+        cmocka_unit_test(a_replay_takes_no_other_poses),
         cmocka_unit_test(the_reach_is_that_of_the_heads_station),
         cmocka_unit_test(no_pose_is_lost_before_its_time),
         cmocka_unit_test(no_pose_is_used_before_its_time),
