@@ -202,7 +202,7 @@
              "platform stands, and its poses count as late. Between two poses it moves evenly."},
     {KEY(platform.address), CFG_TEXT, .def = "127.0.0.1", .of = CFG_KIND(PLATFORM_LIVE),
      .help = "live, in real time: address where poses arrive by UDP, as lines of t_s x y z roll pitch heading, up "
-             "to 3600 s ahead of device time."},
+             "to 3600 s and 65536 poses ahead of device time."},
     {KEY(platform.port), CFG_COUNT, NULL, "0", 0, 65535, .of = CFG_KIND(PLATFORM_LIVE),
      .help = "live: its port; 0: the system chooses."},
     /* clang-format on */

@@ -173,9 +173,10 @@ void device_session_opened(void *self, uint32_t session, const char *who);
 void device_session_closed(void *self, uint32_t session, const char *who, int partial);
 /* Gives the pose of a live platform (not of the head on it) at a device time, from TIME:STEP or the socket. v: x, y, z
  * (m), roll, pitch, heading (degrees). The platform moves evenly from one pose to the next, however far apart they are.
- * No pose is used before its time: before the first one the head is at its station (POSE_NONE). SH_EINPUT: the pose
- * can't be used, which is counted. It is not later than the one before, out of reach, more than DEVICE_POSE_AHEAD_S
- * ahead of device time (not in the pace step), or there are DEVICE_POSES_KEPT that pulses still need. */
+ * Before the first one the head is at its station (POSE_NONE); only in the pace step the first one holds before its
+ * time, too. SH_EINPUT: the pose can't be used, which is counted. It is not later than the one before, out of reach,
+ * before power-up, more than DEVICE_POSE_AHEAD_S ahead of device time (not in the pace step), or there are
+ * DEVICE_POSES_KEPT that pulses still need, or a journal with poses is being replayed. */
 int device_pose(struct device *device, int64_t t_ns, const double v[6], struct sh_err *err);
 
 /* A command whose effect is COMMAND_MOVE has moved nothing yet. First call device_plan_move, in any thread.

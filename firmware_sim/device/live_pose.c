@@ -149,6 +149,17 @@ static uint32_t extrapolate(const struct device *device, int64_t t_ns, struct po
     return flags;
 }
 
+/* In the pace `step` the first pose comes with the step that leads to it, and holds for that whole step. Elsewhere it
+ * may be of any time ahead, so it says nothing of the time before. */
+static uint32_t before_poses(const struct device *device, struct pose *out)
+{
+    const struct device_live *live = &device->live;
+    const int holds = device->site->cfg->loop.pace == PACE_STEP && live->n != 0 && live->n <= DEVICE_POSES_KEPT;
+    if (!holds || !is_near(device, &sample_at(live, 0)->pose)) return POSE_NONE;
+    *out = sample_at(live, 0)->pose;
+    return 0;
+}
+
 /* Returns the last of the poses from `first` on that is at t_ns or before. The first one is. */
 static uint64_t find_sample(const struct device_live *live, uint64_t first, int64_t t_ns)
 {
@@ -169,7 +180,7 @@ static uint32_t platform_at(const struct device *device, int64_t t_ns, struct po
 {
     const struct device_live *live = &device->live;
     const uint64_t first = live->n > DEVICE_POSES_KEPT ? live->n - DEVICE_POSES_KEPT : 0;
-    if (live->n == 0 || t_ns < sample_at(live, first)->t_ns) return POSE_NONE;
+    if (live->n == 0 || t_ns < sample_at(live, first)->t_ns) return before_poses(device, out);
     const uint64_t i = find_sample(live, first, t_ns);
     const struct device_sample *a = sample_at(live, i), *b = sample_at(live, i + 1);
     if (!is_near(device, &a->pose)) return POSE_NONE;
