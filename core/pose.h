@@ -46,7 +46,7 @@ struct pose_knot {
 enum pose_flags {
     POSE_EXTRAPOLATED = 1u << 0, /* after the last live pose that had arrived */
     POSE_LATE = 1u << 1,         /* too long after it: the platform is taken to stand */
-    POSE_NONE = 1u << 2,         /* no live pose had arrived yet: this is the station's */
+    POSE_NONE = 1u << 2,         /* no live pose of this time or before had arrived: this is the station's */
 };
 
 void pose_from_angles(double heading_rad, double pitch_rad, double roll_rad, double quat[4]);

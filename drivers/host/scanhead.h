@@ -396,7 +396,7 @@ struct scanhead_pose {
 enum scanhead_pose_flags {
     SCANHEAD_POSE_EXTRAPOLATED = 1, /* beyond the last pose that the head had been given */
     SCANHEAD_POSE_LATE = 2,         /* too long after the last pose: the head assumed that the platform stands */
-    SCANHEAD_POSE_NONE = 4,         /* the head had not been given any yet */
+    SCANHEAD_POSE_NONE = 4,         /* the head had been given none of that time or before */
 };
 /* Gets the pose at t_ns since the scan's start. The pose is known for the points that came last, and some seconds back.
  * SCANHEAD_ESTATE where the stream has not reported the pose, or the head stands still. */

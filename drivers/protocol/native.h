@@ -286,7 +286,8 @@ enum native_event_code {
     NATIVE_EV_ERROR = 7,       /* a: SCPI error number (two's complement), b: session, 0: the head, c: 0, or how many
                                   errors of the session were held back */
     NATIVE_EV_SETTINGS = 8,    /* a: first pulse with the new settings */
-    NATIVE_EV_POSE_LATE = 9,   /* no pose in time; a: poses made up so far, c: ns since the last one that came */
+    NATIVE_EV_POSE_LATE = 9,   /* no pose in time; a: poses made up so far, c: ns since the last one that came;
+                                  0: none of that time or before came */
     NATIVE_EV_PPS = 10,  /* a full second of the head's clock; a: UTC, s since 1970, b: device time of the edge, ns,
                            c: GPS time, s; the text is the UTC */
     NATIVE_EV_TIME = 11, /* the head's clock, before each repeated descriptor; a: 0, b: device time, ns, c: its GPS

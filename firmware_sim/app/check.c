@@ -79,7 +79,7 @@ static void print_scanners(const struct sites *sites, FILE *out)
 static void print_platform(const struct site *site, FILE *out)
 {
     const struct config_platform *p = &site->cfg->platform;
-    if (p->kind == PLATFORM_LIVE) fprintf(out, "platform  live, up to %g m from station 1\n", p->reach_m);
+    if (p->kind == PLATFORM_LIVE) fprintf(out, "platform  live, up to %g m from its station\n", p->reach_m);
     if (p->kind != PLATFORM_TRAJECTORY) return;
     double way_m = 0.0;
     for (size_t i = 1; i < site->n_knots; i++)

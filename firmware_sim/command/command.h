@@ -204,6 +204,7 @@ struct command_device {
     int keeps;                               /* 1: the head can keep settings without power */
     int step_allowed;                        /* 1 when the pace is `step` */
     int pose_allowed;                        /* 1 when the platform is live: a step may carry a pose */
+    int poses_replayed;                      /* but not while a journal that is being replayed has the poses */
     double pose_centre_m[3], pose_reach_m;   /* the pose must be within pose_reach_m of the centre; scene frame */
     const struct command_place *place;       /* [limits.n_stations] as they are now; NULL: not known */
     const struct command_place *first_place; /* at power-up */

@@ -170,6 +170,9 @@ int command_take_pose(struct command_call *call)
     size_t len;
     if (!call->dev->pose_allowed)
         return command_fail(call, CMD_E_SETTINGS, "a pose in %s needs platform.kind: live", header);
+    if (call->dev->poses_replayed)
+        return command_fail(call, CMD_E_SETTINGS, "%s: a journal with poses is being replayed; allowed is a time alone",
+                            header);
     for (int i = 0; i < PARTS && rest != NULL; i++) {
         rest = command_take_field(rest, field, &len);
         if (site_pose_take_number(call, &of_step[i], field, len, &out->pose[i]) != 0) return -1;

@@ -196,13 +196,13 @@
     {KEY(platform.mount_roll_deg), CFG_REAL, "deg", "0", -360, 360, .of = ~CFG_KIND(PLATFORM_STATIC),
      .help = "Positive: right side down."},
     {KEY(platform.reach_m), CFG_REAL, "m", "100", 1, 1e5, .of = CFG_KIND(PLATFORM_LIVE),
-     .help = "live: largest distance of the head from the station."},
+     .help = "live: largest distance of the platform from the station of head.station."},
     {KEY(platform.extrapolate_ms), CFG_REAL, "ms", "100", 0, 10000, .of = CFG_KIND(PLATFORM_LIVE),
      .help = "live: how long the motion between the last two poses is continued after the last one. After that the "
              "platform stands, and its poses count as late. Between two poses it moves evenly."},
     {KEY(platform.address), CFG_TEXT, .def = "127.0.0.1", .of = CFG_KIND(PLATFORM_LIVE),
      .help = "live, in real time: address where poses arrive by UDP, as lines of t_s x y z roll pitch heading, up "
-             "to 3600 s ahead of device time."},
+             "to 3600 s and 65536 poses ahead of device time."},
     {KEY(platform.port), CFG_COUNT, NULL, "0", 0, 65535, .of = CFG_KIND(PLATFORM_LIVE),
      .help = "live: its port; 0: the system chooses."},
     /* clang-format on */

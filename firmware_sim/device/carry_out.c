@@ -132,6 +132,8 @@ static void do_command(struct device *device, uint32_t session, const char *line
     cmd->t_ns = (int64_t)released * device->tick_ns;
     device->desk.now_ns = (int64_t)device->next_tick * device->tick_ns;
     cmd->fixed = why_fixed(device, session);
+    cmd->poses_replayed = device_replays_poses(device);
+    memcpy(cmd->pose_centre_m, device_reach_centre(device), sizeof cmd->pose_centre_m);
     /* HEAD:STORe of a journal (session 0) is not refused, though a replay stores nothing. */
     cmd->keeps = session == 0 || device->settings != NULL;
     cmd->lost_journal_lines = atomic_load(&device->counters.lost_journal_lines);
@@ -238,7 +240,10 @@ int device_run_replay(struct device *device, uint64_t tick)
     while (device->journal.at < device->journal.n_replay && device->journal.replay[device->journal.at].tick <= tick) {
         const struct journal_entry *entry = &device->journal.replay[device->journal.at++];
         struct command_result result;
-        do_command(device, 0, entry->line, (uint64_t)(entry->t_ns / device->tick_ns), 0, &result);
+        if (journal_pose(entry) != NULL)
+            device_replay_pose(device, entry, &result);
+        else
+            do_command(device, 0, entry->line, (uint64_t)(entry->t_ns / device->tick_ns), 0, &result);
         if (result.effect == COMMAND_MOVE) {
             device_begin_move(device, entry->session, entry->line, entry->t_ns, &result);
             return 1;

@@ -45,7 +45,6 @@ static int set_up_commands(struct device *device, struct sh_err *err)
     device->cmd.plan = device->plan;
     device->cmd.step_allowed = cfg->loop.pace == PACE_STEP;
     device->cmd.pose_allowed = cfg->platform.kind == PLATFORM_LIVE;
-    memcpy(device->cmd.pose_centre_m, device->site->station[0].at.position_m, sizeof device->cmd.pose_centre_m);
     device->cmd.pose_reach_m = cfg->platform.reach_m;
     device->cmd.fixed = site_why_fixed(device->site);
     device->cmd.place = device->moves.place;
@@ -65,6 +64,7 @@ static int open_replay(struct device *device, struct sh_err *err)
     int rc = journal_read(device->options.replay, &journal->replay, &journal->n_replay, err);
     if (rc != SH_OK) return rc;
     for (size_t i = 0; i < journal->n_replay && !journal->ends; i++) {
+        journal->has_poses |= journal_pose(&journal->replay[i]) != NULL;
         if (!journal_is_end(&journal->replay[i])) continue;
         end_run_at(device, journal->replay[i].tick);
         journal->n_replay = i; /* commands after the end had no effect */
@@ -149,6 +149,7 @@ int device_create(const struct site *site, const struct device_options *options,
     if (rc == SH_OK) rc = device_open_moves(&device->moves, device->site, err);
     if (rc == SH_OK) rc = set_up_commands(device, err);
     if (rc == SH_OK) rc = check_live(device, err);
+    if (rc == SH_OK) rc = device_open_poses(device, err);
     if (rc == SH_OK) rc = head_clock_create(&site->cfg->time, &device->clock, err);
     gnss_init(&device->gnss, site, &device->clock);
     device_init_time_server(device);
@@ -215,6 +216,7 @@ void device_free(struct device *device)
     device_free_variants(&device->variants);
     free(device->journal.replay);
     free(device->station_scans);
+    free(device->live.sample);
     device_close_moves(&device->moves);
     pthread_mutex_destroy(&device->lock);
     free(device);

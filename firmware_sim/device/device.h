@@ -28,7 +28,7 @@
 #include "firmware_sim/fault/board.h"
 #include "firmware_sim/site/site.h"
 
-enum { DEVICE_MAX_EVENTS = 24, DEVICE_MAX_POSES = 256, DEVICE_POSE_AHEAD_S = 3600 };
+enum { DEVICE_MAX_EVENTS = 24, DEVICE_MAX_POSES = 256, DEVICE_POSE_AHEAD_S = 3600, DEVICE_POSES_KEPT = 1 << 16 };
 
 /* Counters that casters, pacing thread and readers share. COUNTS.md defines the words.
  * Once all claimed ticks are released or lost, cast = pulses + lost_pulses. */
@@ -41,7 +41,7 @@ struct device_counters {
     _Atomic uint64_t lost_samples;            /* of waveforms: no room in their block */
     _Atomic uint64_t late_blocks, late_max_ns;
     _Atomic uint64_t reader_lost_frames, reader_lost_pulses; /* left out for readers that were too slow */
-    /* live: poses that were extrapolated because none came in time, and poses that could not be used */
+    /* live: poses of the head that were made up because none came in time, and poses that could not be used */
     _Atomic uint64_t late_poses, bad_poses;
     _Atomic uint64_t lost_journal_lines, lost_truth_lines; /* their files were too slow, or could not be written */
 };
@@ -172,10 +172,12 @@ void device_session_opened(void *self, uint32_t session, const char *who);
 /* A session has gone; partial: in the middle of a command. Gives control back. */
 void device_session_closed(void *self, uint32_t session, const char *who, int partial);
 /* Gives the pose of a live platform (not of the head on it) at a device time, from TIME:STEP or the socket. v: x, y, z
- * (m), roll, pitch, heading (degrees). The platform moves evenly from one pose to the next, however far apart
- * they are. Returns 0, or 1 for a pose that can't be used, which is counted: not later than the one before,
- * out of reach, or more than DEVICE_POSE_AHEAD_S ahead of device time (not in the pace step). */
-int device_pose(struct device *device, int64_t t_ns, const double v[6]);
+ * (m), roll, pitch, heading (degrees). The platform moves evenly from one pose to the next, however far apart they are.
+ * Before the first one the head is at its station (POSE_NONE); only in the pace step the first one holds before its
+ * time, too. SH_EINPUT: the pose can't be used, which is counted. It is not later than the one before, out of reach,
+ * before power-up, more than DEVICE_POSE_AHEAD_S ahead of device time (not in the pace step), or there are
+ * DEVICE_POSES_KEPT that pulses still need, or a journal with poses is being replayed. */
+int device_pose(struct device *device, int64_t t_ns, const double v[6], struct sh_err *err);
 
 /* A command whose effect is COMMAND_MOVE has moved nothing yet. First call device_plan_move, in any thread.
  * device_plan_move plans the station's new place (maps, beams), which takes milliseconds to seconds, without the

@@ -28,8 +28,8 @@ struct device_live {
     struct device_sample {
         int64_t t_ns;     /* device time */
         struct pose pose; /* of the platform */
-    } sample[64];
-    uint64_t n; /* poses that came; number i is at i % 64 */
+    } * sample;           /* [DEVICE_POSES_KEPT]; NULL: the platform isn't live */
+    uint64_t n;           /* poses that came; number i is at i % DEVICE_POSES_KEPT */
     struct pose_knot knot[2 * DEVICE_MAX_POSES];
     int64_t next;       /* knots made in this scan; number i, at i ticks of the scan, is at i % LEN(knot) */
     uint64_t said_tick; /* tick of the last event about late poses */
@@ -68,6 +68,7 @@ struct device_journal {
     struct journal_entry *replay;
     size_t n_replay, at; /* next entry to carry out */
     int ends;            /* the replayed one has an end */
+    int has_poses;       /* and poses of a live platform */
     uint64_t end_tick;   /* where the run at hand ended, once it is over */
     size_t n_refused;    /* commands of the replayed one; the first of them, and its reply: */
     const struct journal_entry *refused;
@@ -178,6 +179,15 @@ int64_t device_path_end_ns(const struct device *device);
 /* The head's pose at a device time; 0: it stands at its station. A trajectory runs from the start of the
  * last scan to its end; then the platform stands there until the next scan begins. */
 int device_head_pose(struct device *device, int64_t t_ns, struct pose *head);
+/* The place that a live platform stays within platform.reach_m of: the station of the scan that is on, or of the next
+ * one. */
+const double *device_reach_centre(const struct device *device);
+/* Makes room for the poses of a live platform; does nothing for other ones. device_free frees it. */
+int device_open_poses(struct device *device, struct sh_err *err);
+/* Takes a pose of the replayed journal. *out has the error. */
+void device_replay_pose(struct device *device, const struct journal_entry *entry, struct command_result *out);
+/* Whether poses come from the journal that is being replayed, so that no others are taken. */
+int device_replays_poses(const struct device *device);
 /* Gives the work the poses that a live head has at the work's pulses. */
 void device_take_poses(struct device *device, struct device_work *work);
 

@@ -1,13 +1,17 @@
 /* SPDX-License-Identifier: MIT */
-/* The journal: every command that had an effect, with its device time. Replayed, it reproduces the session.
+/* The journal: every command that had an effect, and every pose that a live platform took, with their device times.
+ * Replayed, it reproduces the session.
  *
- * In: commands as the device carries them out. Out: a text file, which can be read back. The file begins with the line
- * `# scanhead journal 1`. Then there is one line per command
+ * In: commands as the device carries them out, and poses as it takes them. Out: a text file, which can be read back.
+ * The file begins with the line `# scanhead journal 1`. Then there is one line per command
  *   <device tick> <device time, ns> <session> <command line>
  * with decimal numbers and one blank between them. The command takes effect with that tick. The device time is that of
  * the last released tick, which the client has seen. It is after the tick's own time where the head gave up ticks that
- * were not claimed yet. The last line has the session 0 and END in place of a command: the run ended at that tick. This
- * last line is missing where the head was killed. Other lines that begin with '#' and empty lines are notes.
+ * were not claimed yet.
+ *   <device tick> <device time, ns> 0 POSE x y z roll pitch heading
+ * is a pose of a live platform (pose_line.h). It is there from that tick on, and the device time is the pose's own. The
+ * last line has the session 0 and END in place of a command: the run ended at that tick. This last line is missing
+ * where the head was killed. Other lines that begin with '#' and empty lines are notes.
  *
  * A thread writes the lines at once (line_writer.h), so the caller never waits for the file. Where the file is too
  * slow, commands are dropped: a line `LOST <n>` stands for n of them, and journal_read refuses such a file. For dropped
@@ -32,6 +36,10 @@ struct journal *journal_open(const char *path, _Atomic uint64_t *lost, struct sh
  * return that, too, and journal_close gives the reason. */
 int journal_write(struct journal *journal, uint64_t tick, int64_t t_ns, uint32_t session, const char *line);
 
+/* Adds a pose of a live platform, of the device time t_ns; failures as in journal_write. v: as pose_line_write takes
+ * it. */
+int journal_write_pose(struct journal *journal, uint64_t tick, int64_t t_ns, const double v[6]);
+
 /* Sets the tick at which the run ended. journal_close writes the line END with this tick. SH_EINPUT: t_ns is
  * negative. */
 int journal_end(struct journal *journal, uint64_t tick, int64_t t_ns);
@@ -55,6 +63,8 @@ struct journal_entry {
 
 /* 1: no command, but the end of the run. */
 int journal_is_end(const struct journal_entry *entry);
+/* Returns the numbers of a pose, as pose_line_read takes them; NULL where the entry is none. */
+const char *journal_pose(const struct journal_entry *entry);
 
 /* Fails when a journal to write is the one to replay, by whatever path or link: opening it would empty it.
  * Either may be NULL. */

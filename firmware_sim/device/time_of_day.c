@@ -207,7 +207,8 @@ int device_fix(void *self, int64_t t_ns, struct nmea_fix *fix)
     uint32_t station = device->cmd.settings.station - 1;
     int moves = device_head_pose(device, at_ns, &track.at);
     if (moves) {
-        device_head_pose(device, at_ns - GNSS_STEP_NS, &track.before);
+        /* Just before the time there may be no pose of a live platform yet. */
+        if (!device_head_pose(device, at_ns - GNSS_STEP_NS, &track.before)) track.before = track.at;
         device_head_pose(device, at_ns + GNSS_STEP_NS, &track.after);
     }
     pthread_mutex_unlock(&device->lock);

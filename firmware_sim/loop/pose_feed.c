@@ -16,12 +16,12 @@
 #include "drivers/socket/socket.h"
 #include "firmware_sim/base/clock.h"
 #include "firmware_sim/config/config.h"
+#include "firmware_sim/device/pose_line.h"
 
 enum { DATAGRAM = 65536 };
 
 struct pose_feed {
     struct device *device;
-    double reach_m; /* from the station */
     int fd, stop_fd;
     char endpoint[96];
     pthread_t thread;
@@ -29,21 +29,6 @@ struct pose_feed {
     int64_t reported_ns; /* when a bad line was reported last */
     char text[DATAGRAM + 1];
 };
-
-/* One line as time and x, y, z, roll, pitch, heading. 0, or -1 when it is malformed. */
-static int parse_line(const char *line, double v[7])
-{
-    static const double most[7] = {1e9, 1e9, 1e9, 1e9, 360.0, 90.0, 360.0};
-    for (int i = 0; i < 7; i++) {
-        char *end;
-        v[i] = strtod(line, &end);
-        if (end == line || !(fabs(v[i]) <= most[i])) return -1;
-        line = end + strspn(end, " \t");
-        if (i < 6 && *line == ',') line++;
-        if (i < 6 && line == end) return -1;
-    }
-    return line[strspn(line, " \t\r")] == '\0' ? 0 : -1;
-}
 
 static void report_bad(struct pose_feed *feed, const char *what)
 {
@@ -55,16 +40,14 @@ static void report_bad(struct pose_feed *feed, const char *what)
 
 static void pose_feed_take_line(struct pose_feed *feed, const char *line)
 {
-    double v[7];
+    double t_s, v[6];
+    struct sh_err err;
     if (line[strspn(line, " \t\r")] == '\0') return;
-    if (parse_line(line, v) != 0) {
+    if (pose_line_read_timed(line, &t_s, v) != 0) {
         atomic_fetch_add(&device_counters(feed->device)->bad_poses, 1);
         report_bad(feed, "a pose is not of the form t_s x y z roll pitch heading");
-    } else if (device_pose(feed->device, llround(1e9 * v[0]), v + 1) != 0) {
-        char text[96];
-        snprintf(text, sizeof text, "a pose is over %g m from the station, not after the last pose, or over 1 h ahead",
-                 feed->reach_m);
-        report_bad(feed, text);
+    } else if (device_pose(feed->device, llround(1e9 * t_s), v, &err) != SH_OK) {
+        report_bad(feed, err.text);
     }
 }
 
@@ -126,7 +109,6 @@ int pose_feed_open(struct device *device, const struct config *cfg, struct pose_
     struct pose_feed *feed = calloc(1, sizeof *feed);
     if (feed == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
     feed->device = device;
-    feed->reach_m = cfg->platform.reach_m;
     feed->fd = -1;
     feed->stop_fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
     int rc = feed->stop_fd < 0 ? sh_fail(err, SH_EIO, "eventfd: %s", strerror(errno)) : SH_OK;

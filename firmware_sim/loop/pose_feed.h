@@ -5,13 +5,11 @@
  *
  *   t_s x y z roll pitch heading
  *
- * in device time in seconds (TIME? asks for it), metres in the scene frame, and degrees as core/pose.h
- * defines them. Blanks or commas stand between the numbers. Out: calls of device_pose. A thread of its own takes the
- * datagrams in.
+ * with the device time in seconds (TIME? asks for it), and the numbers of pose_line.h. Out: calls of device_pose. A
+ * thread of its own takes the datagrams in.
  *
- * A line is not used when it is malformed, out of reach, not later than the one before, or more than
- * DEVICE_POSE_AHEAD_S ahead of device time (except in the pace `step`). Such a line is counted (bad_poses), and
- * reported once per second at most. */
+ * A line that is malformed, or a pose that device_pose refuses, is not used. It is counted (bad_poses), and reported
+ * once per second at most. */
 #ifndef FIRMWARE_SIM_LOOP_POSE_FEED_H
 #define FIRMWARE_SIM_LOOP_POSE_FEED_H
 

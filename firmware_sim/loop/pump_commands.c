@@ -35,8 +35,10 @@ static void start_step(struct pump *pump, struct session *s, const struct comman
 {
     struct session_commands *c = &s->commands;
     uint64_t total_ns = stream_grant(pump->stream, (uint64_t)result->step_ns);
-    if (result->have_pose) /* before time passes */
-        device_pose(pump->links->mover.device, (int64_t)total_ns, result->pose);
+    struct sh_err err;
+    /* before time passes */
+    if (result->have_pose && device_pose(pump->links->mover.device, (int64_t)total_ns, result->pose, &err) != SH_OK)
+        source_report(pump->links->source, CMD_E_SETTINGS, err.text);
     c->step_tick = stream_pass(pump->stream, total_ns);
     c->stepping = 1;
     memcpy(c->step_reply, result->reply, sizeof c->step_reply);

@@ -69,9 +69,10 @@ uint32_t worker_tick_bytes(const struct site *site)
     const struct config *cfg = site->cfg;
     uint32_t poses = config_head_moves(&cfg->platform) ? NATIVE_MAX_FRAME : 0;
     const uint32_t n_pulses = device_tick_pulses(cfg);
+    uint32_t frames = device_tick_lines(cfg);
+    if (site->n_movers != 0) frames += SCHEDULE_PACKET + cfg->profile.emitter.n_beams; /* move_meshes */
     return OVERHEAD_BYTES + poses +
-           line_bytes(cfg, n_pulses * site_most_points_per_pulse(site), device_tick_lines(cfg),
-                      site_wave_room(site, n_pulses));
+           line_bytes(cfg, n_pulses * site_most_points_per_pulse(site), frames, site_wave_room(site, n_pulses));
 }
 
 uint32_t worker_usual_bytes(const struct site *site)
@@ -270,13 +271,28 @@ static void add_points(struct worker *worker, const struct device_work *work)
     added(worker, native_encode_points(to.at, to.room, block, work->scan_t0_ns));
 }
 
+/* Puts moving meshes where they are at the start of pulse k's own tick of device time: the pulse may have waited for
+ * its packet, and be claimed with a later tick. So where a mesh is depends on the pulse's time alone. Returns the first
+ * pulse of the next such tick, or end. At a stop meshes stand still. */
+static uint64_t move_meshes(struct worker *worker, const struct device_work *work, uint64_t k, uint64_t end)
+{
+    const struct site *site = worker->site;
+    if (site->n_movers == 0) return end;
+    const int64_t tick_ns = 1000000000 / llround(site->cfg->loop.tick_hz);
+    const int64_t from_ns = schedule_time_ns(&work->segment, k) / tick_ns * tick_ns;
+    site_move(site, site_mover_time(site, work->station, 1e-9 * (double)from_ns), &worker->setup);
+    if (site->stop != NULL) return end;
+    const uint64_t next = schedule_pulse_at(&work->segment, from_ns + tick_ns);
+    return next < end ? next : end;
+}
+
 static void cast_run(struct worker *worker, const struct device_work *work, const struct worker_part *part)
 {
     uint64_t k = part->cast0, end = part->cast_end;
     const uint64_t longest = schedule_longest_run(&work->segment, MAX_DT_NS);
     while (k < end) {
         struct schedule_run run;
-        uint64_t stop = enter_stretch(worker, work, k, end);
+        uint64_t stop = move_meshes(worker, work, k, enter_stretch(worker, work, k, end));
         uint64_t n = stop - k < longest ? stop - k : longest;
         schedule_get_run(&work->segment, &part->line, k, (uint32_t)n, &run);
         if (work->disturbance.on && work->disturbance.stuck)
@@ -364,10 +380,6 @@ static void fill_pulses(struct worker *worker, const struct device_work *work)
 {
     worker->anchored = work->stretch;
     worker->block.waves = work->waves != 0 ? worker->waves : NULL;
-    if (worker->site->n_movers != 0)
-        site_move(worker->site,
-                  site_mover_time(worker->site, work->station, 1e-9 * (double)(work->t_ns - work->scan_t0_ns)),
-                  &worker->setup);
     take_poses(worker, work);
     struct worker_part part;
     for (uint64_t k = work->pulse0; k < work->pulse_end; k = part.end) {

@@ -186,13 +186,9 @@ int site_load_platform(struct site *site, const struct sh_report *report, struct
     const struct config_platform *p = &cfg->platform;
     set_mount(site);
     if (p->kind == PLATFORM_LIVE) {
-        double reach_m = 0.0;
-        for (uint32_t i = 1; i < cfg->n_stations; i++)
-            reach_m = fmax(reach_m, vec3_distance(site->station[0].at.position_m, site->station[i].at.position_m));
         const double *arm = p->mount_m;
-        double head_m = p->reach_m + sqrt(vec3_dot(arm, arm));
-        site->live_reach_m = head_m + reach_m;
-        return add_stretch(site, site->station[0].at.position_m, head_m, INT64_MAX, err);
+        site->live_reach_m = p->reach_m + sqrt(vec3_dot(arm, arm));
+        return add_stretch(site, site->station[0].at.position_m, site->live_reach_m, INT64_MAX, err);
     }
     int rc = load_knots(site, report, err);
     return rc == SH_OK ? cover_path(site, err) : rc;

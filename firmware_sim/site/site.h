@@ -157,7 +157,7 @@ struct site {
     double knot_error_m;          /* largest distance of the head's path from the trajectory */
     struct site_stretch *stretch; /* in order of time */
     size_t n_stretches;
-    double live_reach_m; /* of a live head from any station */
+    double live_reach_m; /* of a live head from its station */
     double scale_m;      /* of positions and ranges on the wire, metres per count */
 };
 

@@ -285,7 +285,7 @@ static void platforms(void **state)
     has(text, "platform  trajectory of 2.500 s, 7.000 m; ...");
     free(text);
     text = checked(ONE, (const char *const[]){"platform={kind: live, reach_m: 7.5}", NULL});
-    has(text, "platform  live, up to 7.5 m from station 1");
+    has(text, "platform  live, up to 7.5 m from its station");
     free(text);
     snprintf(file, sizeof file, "platform={kind: stops, file: %s, start_s: 0, step_s: 1}", path);
     text = checked(PLACED, (const char *const[]){file, NULL});

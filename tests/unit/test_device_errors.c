@@ -70,6 +70,7 @@ static void a_replay_says_what_it_refused(void **state)
     } cases[] = {{"300 300000000 1 HEAD:LINES 50\n", NULL},
                  {"300 300000000 1 HEAD:LINES 50\n301 301000000 1 HEAD:LINES 99999\n302 302000000 2 BLAH\n",
                   ":3: HEAD:LINES 99999: ERR -222"},
+                 {"0 300000000 0 POSE 1 2 3 4 5 6\n", ":2: POSE 1 2 3 4 5 6: a pose needs platform.kind: live"},
                  {"300 300000000 1 SITE:POSE 1, 0,0,-1.9,0,0,0\n", /* only planning shows that it can't stand there */
                   ":2: SITE:POSE 1, 0,0,-1.9,0,0,0: ERR -221"}};
     static const char *const sets[] = {"stations[0].tripod.leg_m=2.5", "stations[0].tripod.head_above_m=0.2"};

@@ -89,7 +89,7 @@ static void the_head_follows_a_pose_with_its_lock(void **state)
     static const char *const sets[] = {"platform.kind=live"};
     static const double pose[6] = {0, 0, 0, 0, 0, 0};
     struct rig *rig = rig_open(NULL, sets, 1);
-    TAKES(1, device_pose(rig->device, 1000000, pose));
+    TAKES(1, device_pose(rig->device, 1000000, pose, NULL));
     rig_close(rig);
 }
 

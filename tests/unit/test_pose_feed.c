@@ -56,7 +56,7 @@ static uint64_t latest(struct device_sample *sample)
     pthread_mutex_lock(&device->lock);
     const struct device_live *live = &device->live;
     const uint64_t n = live->n;
-    if (n > 0) *sample = live->sample[(n - 1) % (sizeof live->sample / sizeof *live->sample)];
+    if (n > 0) *sample = live->sample[(n - 1) % DEVICE_POSES_KEPT];
     pthread_mutex_unlock(&device->lock);
     return n;
 }
@@ -108,7 +108,7 @@ static void these_lines_are_poses(void **state)
     snprintf(text, sizeof text, "%d.25 1 -2 3 4 5 6\n%d.5 0 0 0 0 0 0", last_s, last_s);
     assert_int_equal(take(text, strlen(text)), 2);
     const struct device_live *live = &rig->device->live;
-    sample = live->sample[(live->n - 3) % (sizeof live->sample / sizeof *live->sample)];
+    sample = live->sample[(live->n - 3) % DEVICE_POSES_KEPT];
     pose_from_angles(angle_rad(6), angle_rad(5), angle_rad(4), quat);
     assert_true(sample.t_ns == (last_s - 1) * INT64_C(1000000000) + 250000000);
     assert_true(sample.pose.position_m[0] == 1 && sample.pose.position_m[1] == -2 && sample.pose.position_m[2] == 3);
@@ -132,6 +132,11 @@ static void these_lines_are_none(void **state)
                {",1.5 1 2 3 4 5 6", 0},
                {"T x 2 3 4 5 6", 0},
                {"T 1 2 nan 4 5 6", 0},
+               {"T 0x1 2 3 4 5 6", 0}, /* decimal numbers alone, as TIME:STEP takes them */
+               {"0x10 1 2 3 4 5 6", 0},
+               {"T 1 2 3 4 5 0x1p2", 0},
+               {"T 1 2 3 4 5 1e", 0},
+               {"T 1 2 3 4 5 1e999", 0},
                {"inf 1 2 3 4 5 6", 0},
                {"T 1 2 3 360.01 5 6", 0},
                {"T 1 2 3 4 90.01 6", 0},
@@ -156,17 +161,21 @@ static void these_lines_are_none(void **state)
 static void the_first_is_reported(void **state)
 {
     (void)state;
-    static const char *const lines[] = {"1.5 1 2 3 4 5\n1.6 1 2", "1.5 7 2 3 4 5 6\n1.6 9 9 9 4 5 6"};
-    static const char *const says[] = {
-        "a pose is not of the form t_s x y z roll pitch heading",
-        "a pose is over 5 m from the station, not after the last pose, or over 1 h ahead"};
-    for (int i = 0; i < 2; i++) {
+    static const struct {
+        const char *lines, *says;
+        uint64_t n; /* good ones */
+    } rows[] = {{"1.5 1 2 3 4 5\n1.6 1 2", "a pose is not of the form t_s x y z roll pitch heading", 0},
+                {"1.5 7 2 3 4 5 6\n1.6 9 9 9 4 5 6", "a pose is over 5 m from the station", 0},
+                {"1.5 0 0 0 0 0 0\n1.5 1 0 0 0 0 0", "a pose is not after the last pose, of 1.5 s", 1},
+                {"-0.5 0 0 0 0 0 0", "a pose is before power-up; allowed is 0 s on", 0},
+                {"3700 0 0 0 0 0 0", "a pose is over 3600 s ahead", 0}};
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         struct command_result result;
         if (i > 0) begin(state);
-        assert_int_equal(take(lines[i], strlen(lines[i])), 0);
+        assert_int_equal(take(rows[i].lines, strlen(rows[i].lines)), rows[i].n);
         device_command(rig->device, 1, "SYST:ERR?", rig->next, &result);
-        if (strstr(result.reply, says[i]) == NULL) fail_msg("%s", result.reply);
-        if (i == 0) end(state);
+        if (strstr(result.reply, rows[i].says) == NULL) fail_msg("%s", result.reply);
+        if (i + 1 < sizeof rows / sizeof rows[0]) end(state);
     }
 }
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The poses of a moving head as they go out with its pulses: on a trajectory and before, between and after the poses of
- * a live platform. */
+ * a live platform. And where moving meshes are in the points beside them. */
 #include <math.h>
 
 #include "core/pose.h"
@@ -85,7 +85,7 @@ static void live_poses_are_sent(void **state)
     rig_go_to(rig, start + 290);
     for (int i = 0; i < 4; i++) {
         const int64_t at_ns = (300 + 10 * i) * MS;
-        assert_int_equal(device_pose(rig->device, t0_ns + at_ns, (double[]){0, way_m(at_ns), 0, 0, 0, 0}), 0);
+        assert_int_equal(device_pose(rig->device, t0_ns + at_ns, (double[]){0, way_m(at_ns), 0, 0, 0, 0}, NULL), 0);
     }
     rig_go_to(rig, start + 303);
     for (int ms = 303; ms < 329; ms++) {
@@ -119,7 +119,7 @@ static void an_episode_is_reported_once(void **state)
     struct rig *rig = rig_open(&(struct device_options){.start = 1}, sets, 4);
     rig_go_to(rig, 10);
     for (int i = 0; i < 2; i++) /* it stands for 2 s */
-        assert_int_equal(device_pose(rig->device, (100 + 1900 * i) * MS, (double[6]){0}), 0);
+        assert_int_equal(device_pose(rig->device, (100 + 1900 * i) * MS, (double[6]){0}, NULL), 0);
     t0_ns = (int64_t)rig_wait(rig, NATIVE_EV_SCAN_START, 1000)->b;
     const struct native_event *event = rig_wait(rig, NATIVE_EV_POSE_LATE, 2000);
     assert_string_equal(event->text, "no pose came in time: the platform is assumed to stand");
@@ -129,20 +129,29 @@ static void an_episode_is_reported_once(void **state)
     rig_close(rig);
 }
 
-/* From a single pose no motion follows. */
-static void a_single_pose_stands(void **state)
+/* From a single pose no motion follows. Before it the head is at its station; in lock-step the pose is that of the step
+ * that leads to it. */
+static void expect_single_pose(int steps)
 {
-    (void)state;
-    static const char *const sets[] = {"platform.kind=live", "platform.extrapolate_ms=20", "platform.reach_m=50"};
-    struct rig *rig = rig_open(NULL, sets, 3);
+    static const char *const sets[] = {"platform.kind=live", "platform.extrapolate_ms=20", "platform.reach_m=50",
+                                       "loop.pace=step"};
+    struct rig *rig = rig_open(NULL, sets, steps ? 4 : 3);
     struct pose pose;
     rig_go_to(rig, 10);
-    assert_int_equal(device_pose(rig->device, 15 * MS, (double[]){1, 3, 0, 0, 0, 0}), 0);
-    for (int ms = 10; ms < 60; ms += 5) {
+    assert_int_equal(device_pose(rig->device, 15 * MS, (double[]){1, 3, 0, 0, 0, 0}, NULL), 0);
+    assert_int_equal(device_head_pose(rig->device, 10 * MS, &pose), steps);
+    for (int ms = steps ? 10 : 15; ms < 60; ms += 5) {
         assert_int_equal(device_head_pose(rig->device, ms * MS, &pose), 1);
         assert_true(pose.position_m[0] == 1.0 && pose.position_m[1] == 3.0);
     }
     rig_close(rig);
+}
+
+static void a_single_pose_stands(void **state)
+{
+    (void)state;
+    expect_single_pose(0);
+    expect_single_pose(1);
 }
 
 /* ---- a trajectory */
@@ -204,6 +213,75 @@ static void knots_of_a_path_are_sent(void **state)
     unlink(path);
 }
 
+/* ---- moving meshes */
+
+static const double RISE_M_S = 10.0;
+
+/* Checks the points on the floor around the head, 2 m below it at first, in one frame. The encoders place a point to
+ * 6e-6 rad at up to 7 m. Returns how many points there are. */
+static uint32_t check_floor(const struct rig *rig, const uint8_t *payload, size_t len)
+{
+    struct native_points head;
+    uint32_t n = 0;
+    assert_int_equal(native_decode_points(payload, len, &head), SH_OK);
+    for (uint32_t i = 0; i < head.n_points; i++) {
+        struct native_point point;
+        native_decode_point(payload, i, &point);
+        const double x_m = (int32_t)point.a * rig->site->scale_m, y_m = (int32_t)point.b * rig->site->scale_m,
+                     z_m = (int32_t)point.c * rig->site->scale_m;
+        if (point.echo == 0 || fabs(x_m) > 3.99 || fabs(y_m) > 4.99) continue; /* a wall */
+        const int64_t tick = native_after_ns(head.t0_ns, point.dt_ns) / MS;
+        const double want_m = -2.0 + RISE_M_S * 1e-3 * (double)tick;
+        if (fabs(z_m - want_m) > 1e-4) fail_msg("tick %lld: floor at %.4f m, not %.4f", (long long)tick, z_m, want_m);
+        n++;
+    }
+    return n;
+}
+
+/* The boxes rise, and others of their kind stand far above them. */
+static void write_rising(const char *path)
+{
+    FILE *f = fopen(path, "w");
+    assert_non_null(f);
+    fprintf(f,
+            "head: {profile: %s/head.yaml, pan_deg_s: 180, pan_stop_deg: 90}\n"
+            "scene:\n  meshes:\n    - {file: room.obj, up: z, scale: 1, move_m_s: [0, 0, 10]}\n"
+            "    - {file: room.obj, up: z, scale: 1, offset_m: [0, 0, 500]}\n"
+            "stations: [{position_m: [0, 0, 0]}]\n",
+            folder);
+    assert_int_equal(fclose(f), 0);
+}
+
+/* A pulse meets a moving mesh where that is at the start of the pulse's own tick, also where the pulse waited for its
+ * packet: a packet of 16 pulses takes 1.6 to 16 ticks here. In lock-step no pulse waits, and the same holds. */
+static void a_mesh_is_where_it_is_at_a_pulses_tick(void **state)
+{
+    (void)state;
+    static const char *const rates[] = {"head.prr_hz=1000", "head.prr_hz=3700", "head.prr_hz=10000"};
+    char path[96];
+    snprintf(path, sizeof path, "%s/rise.yaml", folder);
+    write_rising(path);
+    for (int i = 0; i < 6; i++) {
+        const char *const sets[] = {"output.layout=geo", "head.frames=0",      "head.lines_hz=20",
+                                    rates[i % 3],        "platform.kind=live", "loop.pace=step"};
+        struct rig *rig = rig_open_file("rise.yaml", &(struct device_options){.start = 1}, sets, i < 3 ? 4 : 6);
+        uint32_t n = 0;
+        rig_wait(rig, NATIVE_EV_SCAN_START, 1000);
+        for (int k = 0; k < 120; k++) {
+            const struct ring_tick *tick = rig_fill(rig);
+            for (uint32_t at = 0; at < tick->len; at += (uint32_t)native_frame_len(tick->bytes + at)) {
+                struct native_header h;
+                native_read_header(tick->bytes + at, &h);
+                if (h.type == NATIVE_POINTS) n += check_floor(rig, tick->bytes + at + NATIVE_HEADER_LEN, h.length);
+            }
+            assert_true(rig_claim(rig));
+        }
+        assert_true(n > 10);
+        rig_close(rig);
+    }
+    unlink(path);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -211,6 +289,7 @@ int main(void)
         cmocka_unit_test(an_episode_is_reported_once),
         cmocka_unit_test(a_single_pose_stands),
         cmocka_unit_test(knots_of_a_path_are_sent),
+        cmocka_unit_test(a_mesh_is_where_it_is_at_a_pulses_tick),
     };
     return cmocka_run_group_tests_name("poses that are sent", tests, make_folder, remove_folder);
 }

@@ -213,7 +213,8 @@ static const struct app_option OPTIONS[] = {
      .help = "write statistics as JSON at the end, lateness with percentiles and a histogram; - is standard output"},
     OPTION_NO_HASH(AT(no_hash)),
     {APP_TEXT, "journal", "FILE", .at = AT(device.journal), .file = APP_FILLS,
-     .help = "write every command that had an effect, with its device time, and the end"},
+     .help = "write every command that had an effect, and a live platform's poses, with their device times, and "
+             "the end"},
     {APP_TEXT, "scenario", "FILE", .at = AT(in.scenario), .file = APP_READS,
      .help = "add the faults of this file to those of the configuration; a bare name is one of config/faults"},
     {APP_TEXT, "truth", "FILE", .at = AT(device.truth), .file = APP_FILLS,
