@@ -11,7 +11,7 @@
 
 #include "core/angle.h"
 #include "core/newfile.h"
-#include "core/text.h"
+#include "core/utf8.h"
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/studio/init/mesh.h"
 #include "firmware_sim/app/studio/init/text.h"
@@ -68,7 +68,7 @@ static int find_place(const struct init_run *run, const struct scene *scene, str
 static bool is_utf8(const char *text)
 {
     while (*text != '\0') {
-        const int n = text_utf8_len(text, 4);
+        const int n = utf8_len(text, 4);
         if (n == 0) return false;
         text += n;
     }
