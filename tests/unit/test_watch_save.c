@@ -363,12 +363,32 @@ static void wrong_questions(void **state)
     assert_int_equal(save_get(save, "as=las", &body, &err), SH_EIO);
     has(err.text, "/nowhere/scanhead-save-");
     has(err.text, ": No such file or directory");
+    assert_int_equal(save_get(save, "", &body, &err), SH_EIO);
+    has(err.text, "/nowhere/scanhead-save-");
+    char name[500];
+    memset(name, 'x', sizeof name);
+    name[sizeof name - 1] = '\0';
+    setenv("TMPDIR", name, 1);
+    assert_int_equal(save_get(save, "as=las", &body, &err), SH_EIO);
+    has(err.text, "TMPDIR has 499 bytes; allowed are up to 378: xxxxx");
     set_temporary("t");
     assert_int_equal(save_get(save, "as=las", &body, &err), SH_OK); /* it goes on */
     has(body.bytes, "\"file\":1,");
     free(body.bytes);
     wait_for_file();
     assert_int_equal(save_get_piece(save, "file=2", &body, &err), SH_EINPUT);
+    /* A file that can't even be begun takes the place of the last one, too. */
+    char folder[600], command[700];
+    files_below(folder);
+    snprintf(command, sizeof command, "rm -r %s", folder);
+    assert_int_equal(system(command), 0);
+    set_temporary("nowhere");
+    assert_int_equal(save_get(save, "as=ply", &body, &err), SH_EIO);
+    for (int page = 0; page < 2; page++) {
+        assert_int_equal(save_get(save, "", &body, &err), SH_EIO);
+        has(err.text, "/nowhere/scanhead-save-");
+    }
+    assert_int_equal(save_get_piece(save, "file=1", &body, &err), SH_EINPUT);
 }
 
 /* Each page that asks is told why there is no file. A limit of a file's length stands for a full disk. */

@@ -51,8 +51,13 @@ static int make_folder(struct save *s, struct sh_err *err)
 {
     const char *temporary = getenv("TMPDIR");
     if (s->folder[0] != '\0' && access(s->folder, W_OK) == 0) return SH_OK; /* else a service may have removed it */
-    snprintf(s->folder, sizeof s->folder, "%.300s/scanhead-save-XXXXXX",
-             temporary != NULL && temporary[0] != '\0' ? temporary : "/tmp");
+    if (temporary == NULL || temporary[0] == '\0') temporary = "/tmp";
+    const int n = snprintf(s->folder, sizeof s->folder, "%s/scanhead-save-XXXXXX", temporary);
+    if (n >= (int)sizeof s->folder) {
+        s->folder[0] = '\0';
+        return sh_fail(err, SH_EIO, "TMPDIR has %zu bytes; allowed are up to %zu: %.100s...", strlen(temporary),
+                       sizeof s->folder - sizeof "/scanhead-save-XXXXXX", temporary);
+    }
     if (mkdtemp(s->folder) != NULL) return SH_OK;
     const int rc = sh_fail(err, SH_EIO, "%s: %s", s->folder, strerror(errno));
     s->folder[0] = '\0';
@@ -243,23 +248,31 @@ static int check_as(const char *as, struct sh_err *err)
     return sh_fail(err, SH_EINPUT, "as=%.32s: allowed are las, ply, e57, ptx, pcapng", as);
 }
 
+static int begin_thread(struct save *s, const char *as, struct sh_err *err)
+{
+    const int rc = make_folder(s, err);
+    if (rc != SH_OK) return rc;
+    s->number++;
+    snprintf(s->as, sizeof s->as, "%s", as);
+    snprintf(s->stream, sizeof s->stream, "%s/stream.shs", s->folder);
+    snprintf(s->file, sizeof s->file, "%s/points.%s", s->folder, as);
+    s->has_thread = pthread_create(&s->thread, NULL, make, s) == 0;
+    return s->has_thread ? SH_OK : sh_fail(err, SH_EIO, "no thread for a file");
+}
+
 /* The caller holds the lock. */
 static int begin(struct save *s, const char *as, struct sh_err *err)
 {
     if (s->state == SAVE_WORKING) return sh_fail(err, SH_EINPUT, "a file is being made (%s); ask again later", s->as);
     int rc = check_as(as, err);
-    if (rc == SH_OK) rc = make_folder(s, err);
     if (rc != SH_OK) return rc;
     save_join(s);
     empty_folder(s);
-    s->number++;
     s->gone = s->lost_frames = 0;
-    snprintf(s->as, sizeof s->as, "%s", as);
-    snprintf(s->stream, sizeof s->stream, "%s/stream.shs", s->folder);
-    snprintf(s->file, sizeof s->file, "%s/points.%s", s->folder, as);
-    s->has_thread = pthread_create(&s->thread, NULL, make, s) == 0;
-    s->state = s->has_thread ? SAVE_WORKING : SAVE_IDLE;
-    return s->has_thread ? SH_OK : sh_fail(err, SH_EIO, "no thread for a file");
+    rc = begin_thread(s, as, err);
+    s->state = rc == SH_OK ? SAVE_WORKING : SAVE_FAILED;
+    if (rc != SH_OK) s->failure = *err;
+    return rc;
 }
 
 int save_get(struct save *s, const char *query, struct web_body *out, struct sh_err *err)

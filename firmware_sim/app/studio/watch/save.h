@@ -25,8 +25,8 @@ enum { SAVE_PIECE = 4 << 20 }; /* the most bytes of a piece */
 /* The past and ctx must live on until save_free. NULL: no memory. */
 struct save *save_create(const struct save_source *source);
 /* `/save?as=las` begins a file, `/save` asks for it: JSON (README.md).
- * SH_EINPUT: the format is not one of these, or a file is being made. A file that could not be made is an error
- * until the next one begins. */
+ * SH_EINPUT: the format is not one of these, or a file is being made. A file that could not be made, or not even be
+ * begun, is an error until the next one begins; the file before is gone then. */
 int save_get(struct save *save, const char *query, struct web_body *out, struct sh_err *err);
 /* `/saved?file=NUMBER&from=POSITION` gives bytes of that file from that position; at the file's end it gives none.
  * SH_EINPUT: the file is not there. */
