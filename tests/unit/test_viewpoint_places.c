@@ -79,8 +79,8 @@ static void a_floor_is_not_steep(void **state)
         }
 }
 
-/* A head on the floor, or just above it, stands where a higher one does: on floors that go up by 0.15 m or down, and not
- * beside a wall. */
+/* A head on the floor, or just above it, stands where a higher one does: on floors that go up or down by 0.15 m, and
+ * not beside a wall. */
 static void low_heads_stand_too(void **state)
 {
     (void)state;
