@@ -44,10 +44,21 @@ static void check_limits(struct cfg_reader *rd, const struct config *cfg)
     }
 }
 
+/* A frame has a turn at most, and ends within the limits of the head profile. */
+static void check_pan(struct cfg_reader *rd, const struct config *cfg)
+{
+    const int64_t start = cfg->head.settings.pan_start_udeg, stop = cfg->head.settings.pan_stop_udeg;
+    const int64_t most = cfg_has_profile(rd) ? cfg->profile.pan_max_udeg : INT64_MAX;
+    if ((stop >= start && stop - start <= 360000000) || !CFG_SOUND(rd, "head.pan_start_deg", "head.pan_stop_deg"))
+        return;
+    cfg_fail_key(rd, given_of(rd, "head.pan_stop_deg", "head.pan_start_deg"),
+                 "the pan goes from %.15g to %.15g deg; allowed a pan_stop_deg of %.15g to %.15g", from_micro(start),
+                 from_micro(stop), from_micro(start), from_micro(start + 360000000 < most ? start + 360000000 : most));
+}
+
 static void check_head(struct cfg_reader *rd, const struct config *cfg)
 {
     const struct head_settings *s = &cfg->head.settings;
-    const int64_t span_udeg = s->pan_stop_udeg - s->pan_start_udeg;
     if (s->prr_uhz < s->lines_uhz && CFG_SOUND(rd, "head.prr_hz", "head.lines_hz"))
         cfg_fail_key(rd, given_of(rd, "head.prr_hz", "head.lines_hz"),
                      "less than a pulse per line, %.15g pulses/s and %.15g lines/s; allowed a prr_hz of at least "
@@ -62,11 +73,7 @@ static void check_head(struct cfg_reader *rd, const struct config *cfg)
             from_micro(s->line_start_udeg), from_micro(s->line_stop_udeg),
             cfg->profile.emitter.kind == EMITTER_SPHERE ? "other than" : "below", from_micro(s->line_stop_udeg),
             cfg->profile.emitter.kind == EMITTER_SPHERE ? "other than" : "above", from_micro(s->line_start_udeg));
-    if ((span_udeg < 0 || span_udeg > 360000000) && CFG_SOUND(rd, "head.pan_start_deg", "head.pan_stop_deg"))
-        cfg_fail_key(rd, given_of(rd, "head.pan_stop_deg", "head.pan_start_deg"),
-                     "the pan goes from %.15g to %.15g deg; allowed a pan_stop_deg of %.15g to %.15g",
-                     from_micro(s->pan_start_udeg), from_micro(s->pan_stop_udeg), from_micro(s->pan_start_udeg),
-                     from_micro(s->pan_start_udeg) + 360.0);
+    check_pan(rd, cfg);
     if (s->station > cfg->n_stations && cfg->platform.kind != PLATFORM_STOPS &&
         CFG_SOUND(rd, "stations", "platform.kind"))
         cfg_fail_key(rd, "head.station", "there is no station %u; allowed 1 to %u", s->station, cfg->n_stations);

@@ -84,6 +84,67 @@ static void test_without_returns(void **state)
     unlink(rig_path("a.las"));
 }
 
+static int n_warned;
+static char warned[512];
+
+static void take_warning(void *ctx, const char *text)
+{
+    (void)ctx;
+    n_warned++;
+    snprintf(warned, sizeof warned, "%s", text);
+}
+
+static void expect_warnings(const uint8_t *las, size_t len, int n)
+{
+    static const struct sh_report report = {NULL, take_warning, NULL, NULL};
+    struct cloud cloud;
+    struct sh_err err = {0};
+    write_bytes(las, len);
+    n_warned = 0;
+    if (cloud_read_columns(rig_path("a.las"), 0, &report, &cloud, &err) != 0) fail_msg("%s", err.text);
+    assert_int_equal(n_warned, n);
+    cloud_free(&cloud);
+}
+
+/* A file that holds another one after its points is judged by its first part, with a warning. Extended records after
+ * the points belong to the file: as many as version 1.4 counts, or the one of waveforms. Places are those of LAS 1.4
+ * R15: the start of waveforms at 227, the start of extended records at 235, their number at 243, and a record's length
+ * at 20 of its 60 bytes. */
+static void a_rest_is_warned_of(void **state)
+{
+    (void)state;
+    enum { RECORD = 60 + 7 };
+    size_t len;
+    write_las(NATIVE_CRS_UTM, 32632, 1);
+    uint8_t *one = rig_read(rig_path("a.las"), &len);
+    uint8_t *las = calloc(1, 2 * len + 2 * RECORD);
+    assert_non_null(las);
+    const uint64_t start = len;
+    memcpy(las, one, len);
+    assert_int_equal(las[25], 4);
+    expect_warnings(las, len, 0);
+    memcpy(las + len, one, len);
+    expect_warnings(las, 2 * len, 1);
+    snprintf(warned, sizeof warned, "%s", strchr(warned, ':'));
+    char want[64];
+    snprintf(want, sizeof want, ": %zu bytes after the last point ignored", len);
+    assert_string_equal(warned, want);
+    memset(las + len, 0, len + 2 * RECORD);
+    las[len + 20] = las[len + RECORD + 20] = 7;
+    memcpy(las + 235, &start, sizeof start);
+    las[243] = 2;
+    expect_warnings(las, len + 2 * RECORD, 0);
+    expect_warnings(las, len + 2 * RECORD + 1, 1);
+    las[243] = 0;
+    expect_warnings(las, len + RECORD, 1);
+    memcpy(las + 227, &start, sizeof start);
+    expect_warnings(las, len + RECORD, 0);
+    expect_warnings(las, len + 2 * RECORD, 1);
+    free(las);
+    free(one);
+    unlink(rig_path("a.las"));
+}
+
 /* Coordinates are degrees. The file's x is longitude, the cloud's first is latitude, as in a stream, and within
  * -180..180. */
 static void test_degrees(void **state)
@@ -225,6 +286,7 @@ int main(void)
                                        cmocka_unit_test(test_label_behind_others),
                                        cmocka_unit_test(test_broken),
                                        cmocka_unit_test(test_without_returns),
+                                       cmocka_unit_test(a_rest_is_warned_of),
                                        cmocka_unit_test(test_wkt_without_end)};
     return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
 }

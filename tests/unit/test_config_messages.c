@@ -62,7 +62,7 @@ static const struct {
     {LINES, "  line_start_deg: 60\n", 4, "head.line_start_deg",
      "the line goes from 60 to 60 deg; allowed a line_start_deg below 60, or a line_stop_deg above 60"},
     {LINES, "  pan_start_deg: 20\n  pan_stop_deg: 10\n", 5, "head.pan_stop_deg",
-     "the pan goes from 20 to 10 deg; allowed a pan_stop_deg of 20 to 380"},
+     "the pan goes from 20 to 10 deg; allowed a pan_stop_deg of 20 to 360"},
     {LINES, "  station: 2\n", 4, "head.station", "there is no station 2; allowed 1 to 1"},
     {LINES, "  range_min_m: 9\n  range_max_m: 8\n", 5, "head.range_max_m",
      "the head measures from 9 to 8 m; allowed a range_min_m below 8, or a range_max_m above 9"},

@@ -143,6 +143,9 @@ static void grids_that_do_not_go(void **state)
     refuse(
         "--grid 0.5: no place to stand: no floor there has 1.8 m of room above it; allowed is another grid, --height "
         "or --at");
+    options.of_page = 1;
+    refuse("no place to stand: no floor has 1.8 m of room above it; allowed is another height_m");
+    options.of_page = 0;
     n_found = 100000;
     open_it(SH_OK);
     n_found++;

@@ -1,13 +1,57 @@
 /* SPDX-License-Identifier: MIT */
 /* Each library that is loaded late is found, and a call that it lacks is reported. */
+#include <dlfcn.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <cmocka.h>
 
 #include "core/late.h"
+
+static const char *fails_with; /* NULL: libraries are loaded */
+
+/* The product's calls come here. */
+void *dlopen(const char *file, int flags)
+{
+    void *(*real)(const char *, int) = NULL;
+    void *found = dlsym(RTLD_NEXT, "dlopen");
+    memcpy(&real, &found, sizeof real);
+    return fails_with == NULL ? real(file, flags) : NULL;
+}
+
+char *dlerror(void)
+{
+    return (char *)(uintptr_t)fails_with;
+}
+
+/* The words are those of glibc. "failed to map" is of memory only where there is none, as below a limit. */
+static void a_lack_of_memory_is_its_own_error(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *why;
+        int limited, code;
+    } rows[] = {{"libcrypto.so.3: failed to map segment from shared object", 1, SH_ENOMEM},
+                {"libcrypto.so.3: failed to map segment from shared object", 0, SH_EINPUT},
+                {"libx.so: cannot create shared object descriptor: Cannot allocate memory", 0, SH_ENOMEM},
+                {"libx.so: cannot open shared object file: No such file or directory", 1, SH_EINPUT}};
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        struct rlimit was, low;
+        struct sh_err err = {0};
+        assert_int_equal(getrlimit(RLIMIT_AS, &was), 0);
+        low = (struct rlimit){rows[i].limited ? 1 : was.rlim_cur, was.rlim_max};
+        fails_with = rows[i].why;
+        setrlimit(RLIMIT_AS, &low);
+        const int rc = late_load(LATE_websockets, NULL, NULL, 0, &err);
+        setrlimit(RLIMIT_AS, &was);
+        fails_with = NULL;
+        assert_int_equal(rc, rows[i].code);
+        assert_non_null(strstr(err.text, rows[i].why));
+    }
+}
 
 static void each_is_there(void **state)
 {
@@ -37,6 +81,7 @@ static void a_call_that_is_not_there(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_lack_of_memory_is_its_own_error),
         cmocka_unit_test(each_is_there),
         cmocka_unit_test(a_call_that_is_not_there),
     };

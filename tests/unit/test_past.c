@@ -37,7 +37,25 @@ static void give(struct past *past, int type, int flags, uint32_t seq, uint32_t 
                                          .raw = raw,
                                          .raw_len = NATIVE_HEADER_LEN + payload,
                                          .n_points = n};
-    past_take(past, &frame, 7);
+    past_take(past, &frame);
+}
+
+/* Gives an event of the head; its last value is `value`. */
+static void give_event(struct past *past, uint32_t code, int flags, uint32_t seq, uint64_t value)
+{
+    const struct native_event event = {.code = code, .a = 1, .b = 2, .c = value};
+    native_encode_event(raw, sizeof raw, &event, 0, (uint8_t)flags);
+    const size_t len = native_finish_frame(raw, seq);
+    const struct scanhead_frame frame = {.type = SCANHEAD_EVENT,
+                                         .flags = flags,
+                                         .seq = seq,
+                                         .payload = raw + NATIVE_HEADER_LEN,
+                                         .payload_len = len - NATIVE_HEADER_LEN,
+                                         .raw = raw,
+                                         .raw_len = len,
+                                         .event = code,
+                                         .event_value = {1, 2, value}};
+    past_take(past, &frame);
 }
 
 /* Gives a scan: the frames that place its points, then so many frames of them. The frames' numbers go on from *seq. */
@@ -108,6 +126,7 @@ static void any_piece_can_be_the_first(void **state)
     struct past *past = past_create(&limits);
     uint32_t seq = 5;
     assert_int_equal(read_all(past, 0).points, 0);
+    give_event(past, SCANHEAD_EV_READER_LOST, SCANHEAD_LOCAL, 0, 7);
     give_scan(past, &seq, 40, 1);
     give_scan(past, &seq, 30, 2);
     const struct reading all = read_all(past, 0);
@@ -149,6 +168,55 @@ static void the_oldest_go_and_are_counted(void **state)
                     (all < limits.points ? all : limits.points));
         assert_int_equal(r.last_seq, seq - 1);
     }
+    past_free(past);
+}
+
+/* Writes the kinds of all kept frames, a letter each: D, A, P, L for READER_LOST, E for SCAN_END, ? for others. Frames
+ * that open a piece are left out where the piece before has them, too. */
+static void kinds_of(struct past *past, char *to)
+{
+    struct web_body body;
+    struct sh_err err = {0};
+    assert_int_equal(past_get(past, "", &body, &err), SH_OK);
+    const uint8_t *frame = (const uint8_t *)body.bytes + PAST_HEAD_LEN, *end = (const uint8_t *)body.bytes + body.len;
+    for (; frame < end; frame += native_frame_len(frame)) {
+        static const char letters[] = "?DAP";
+        struct native_event event = {0};
+        if (frame[1] < sizeof letters - 1) *to++ = letters[frame[1]];
+        if (frame[1] < sizeof letters - 1) continue;
+        assert_int_equal(
+            native_decode_event(frame + NATIVE_HEADER_LEN, native_frame_len(frame) - NATIVE_HEADER_LEN, &event), SH_OK);
+        *to++ = event.code == NATIVE_EV_READER_LOST ? 'L' : event.code == NATIVE_EV_SCAN_END ? 'E' : '?';
+    }
+    *to = '\0';
+    free(body.bytes);
+}
+
+/* A loss is known from its report on, also where no points follow it. Before there are points, the last report counts:
+ * it has the sum. */
+static void losses_and_ends_are_kept(void **state)
+{
+    (void)state;
+    const struct past_limits limits = {PAST_MOST_POINTS, PAST_MOST_BYTES};
+    struct past *past = past_create(&limits);
+    uint32_t seq = 0;
+    char kinds[64];
+    give_event(past, SCANHEAD_EV_SCAN_END, 0, seq++, 0); /* without a piece it is not kept */
+    give_event(past, SCANHEAD_EV_READER_LOST, SCANHEAD_LOCAL, 0, 2);
+    assert_int_equal(read_all(past, 0).lost, 2);
+    assert_int_equal(read_all(past, 0).next_seq, 1);
+    give_event(past, SCANHEAD_EV_READER_LOST, SCANHEAD_LOCAL, 0, 3);
+    give_scan(past, &seq, 2, 1);
+    give_event(past, SCANHEAD_EV_SETTINGS, 0, seq++, 0);
+    give_event(past, SCANHEAD_EV_READER_LOST, SCANHEAD_LOCAL, 0, 13);
+    give_event(past, SCANHEAD_EV_READER_LOST, SCANHEAD_LOCAL, 0, 653);
+    kinds_of(past, kinds);
+    assert_string_equal(kinds, "DALPPLL");
+    assert_int_equal(read_all(past, 0).lost, 653);
+    give_event(past, SCANHEAD_EV_SCAN_END, 0, seq++, 0);
+    give_scan(past, &seq, 1, 2);
+    kinds_of(past, kinds);
+    assert_string_equal(kinds, "DALPPLLEDAP");
     past_free(past);
 }
 
@@ -206,6 +274,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(any_piece_can_be_the_first),
         cmocka_unit_test(the_oldest_go_and_are_counted),
+        cmocka_unit_test(losses_and_ends_are_kept),
         cmocka_unit_test(a_wrong_query_is_refused),
         cmocka_unit_test(what_belongs_together_is_in_one_piece),
     };

@@ -1,6 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* Pictures: colours of CIE L*a*b*, fills, triangles and lines by counted pixels, and the elements of an SVG. */
 #include <math.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <sys/resource.h>
 
 #include "core/studio/picture.h"
 #include "tests/unit/scene_files.h"
@@ -363,6 +366,28 @@ static void texts_of_an_svg(void **state)
     free(text);
 }
 
+/* A file of limited length stands for a full disk. Noise does not become shorter, so the limit is met amid the rows. */
+static void the_reason_of_a_failed_write(void **state)
+{
+    (void)state;
+    struct rlimit was, low;
+    struct picture p = blank(200, 200);
+    uint32_t seed = 1;
+    for (size_t i = 0; i < (size_t)3 * 200 * 200; i++)
+        p.rgb[i] = (uint8_t)((seed = seed * 1664525 + 1013904223) >> 24);
+    signal(SIGXFSZ, SIG_IGN);
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &was), 0);
+    low = (struct rlimit){20000, was.rlim_max};
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &low), 0);
+    const int rc = picture_write_png(&p, "map", path_in("full.png"), &err);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &was), 0);
+    signal(SIGXFSZ, SIG_DFL);
+    assert_int_equal(rc, SH_EIO);
+    assert_non_null(strstr(err.text, "full.png"));
+    assert_non_null(strstr(err.text, ": File too large"));
+    picture_free(&p);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -375,6 +400,7 @@ int main(void)
         cmocka_unit_test(accents_add_no_width),
         cmocka_unit_test(wrong_bytes_are_boxes),
         cmocka_unit_test(texts_have_their_strokes),
+        cmocka_unit_test(the_reason_of_a_failed_write),
         cmocka_unit_test(elements_of_an_svg),
         cmocka_unit_test(texts_of_an_svg),
     };

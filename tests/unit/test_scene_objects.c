@@ -86,6 +86,8 @@ static void bodies_are_judged(void **state)
             52, -24);
         one(BOX, x_m, SCENE_OBJECT_OPEN, 4, 46, 0);
         one(BOX "f 8 7 6 5\n", x_m, SCENE_OBJECT_TURNED, 0, 52, 0);
+        /* A face that is there twice: each of its four edges has three triangles, and its diagonal has four. */
+        one(BOX "f 5 6 7 8\nf 5 6 7 8\n", x_m, SCENE_OBJECT_OPEN, 4, 58, 0);
         /* The top's edges have corners in their middles, which the sides don't have. */
         one(BOX "v 1 0 4\nv 1 3 4\nf 5 9 10 8\nf 9 6 7 10\n", x_m, SCENE_OBJECT_CLOSED, 0, 52, 24);
         /* Half of the top closes two edges. Its diagonal and the two other edges of the top stay open. */

@@ -79,6 +79,26 @@ static void a_floor_is_not_steep(void **state)
         }
 }
 
+/* A head on the floor, or just above it, stands where a higher one does: on floors that go up or down by 0.15 m, and
+ * not beside a wall. */
+static void low_heads_stand_too(void **state)
+{
+    (void)state;
+    static const double height_m[] = {0, 0.001, 0.1, 0.159, 0.161, 1.5};
+    for (size_t i = 0; i < sizeof height_m / sizeof height_m[0]; i++) {
+        const struct viewpoint_grid grid = {1.0, height_m[i], {-0.5, -0.5, -5}, {0.5, 0.5, 5}};
+        for (int row = 0; row < 4; row++) {
+            const double steep = row == 1 ? 19.9 : row == 2 ? 20.1 : 0, h = 2 * tan(angle_rad(steep));
+            add_quad((const double[4][3]){{-2, -2, -h}, {2, -2, h}, {2, 2, h}, {-2, 2, -h}});
+            if (row == 3) add_quad((const double[4][3]){{0.2, -2, 0}, {0.2, 2, 0}, {0.2, 2, 3}, {0.2, -2, 3}});
+            assert_int_equal(find_all(&grid, NULL), SH_OK);
+            n_quads = 0;
+            assert_int_equal(n_places, row < 2);
+            if (n_places == 1) assert_true(fabs(place[0].position_m[2] - height_m[i]) < 5.01e-4);
+        }
+    }
+}
+
 /* At least 0.2 m above the head are free. A floor's lower side counts as a ceiling. */
 static void there_is_room_above(void **state)
 {
@@ -227,10 +247,11 @@ static int free_places(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_floor_is_not_steep), cmocka_unit_test(there_is_room_above),
-        cmocka_unit_test(most_legs_stand),      cmocka_unit_test(legs_stand_level),
-        cmocka_unit_test(the_head_is_free),     cmocka_unit_test(floors_lie_within_the_area),
-        cmocka_unit_test(the_grid_is_in_order), cmocka_unit_test(the_search_can_be_stopped),
+        cmocka_unit_test(a_floor_is_not_steep),       cmocka_unit_test(low_heads_stand_too),
+        cmocka_unit_test(there_is_room_above),        cmocka_unit_test(most_legs_stand),
+        cmocka_unit_test(legs_stand_level),           cmocka_unit_test(the_head_is_free),
+        cmocka_unit_test(floors_lie_within_the_area), cmocka_unit_test(the_grid_is_in_order),
+        cmocka_unit_test(the_search_can_be_stopped),
     };
     return cmocka_run_group_tests(tests, NULL, free_places);
 }

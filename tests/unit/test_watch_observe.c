@@ -270,6 +270,47 @@ static void telemetry_ends_a_scan(void **state)
     }
 }
 
+static void end_scan_of_device(void)
+{
+    struct device_work *work = calloc(1, sizeof *work);
+    assert_non_null(work);
+    do {
+        assert_int_equal(device_claim(device, work), 0);
+        device_done(work);
+    } while (work->scanning);
+    free(work);
+}
+
+static void give_scan_end(void)
+{
+    uint8_t frame[256];
+    const struct native_event end = {.code = NATIVE_EV_SCAN_END, .a = 1};
+    native_encode_event(frame, sizeof frame, &end, 1000000000, 0);
+    give(frame, native_finish_frame(frame, 1));
+}
+
+/* Once the head's scan is over, the observer is behind until it has read that: by the event, or by telemetry. The scan
+ * may have no points, in the last two rows. An observer that reads no more is not waited for. */
+static void the_observer_is_behind_until_the_end(void **state)
+{
+    (void)state;
+    record("");
+    for (int row = 0; row < 5; row++) {
+        open_watch(NULL, 0);
+        assert_int_equal(watch_is_behind(w), 0); /* the scan goes on */
+        end_scan_of_device();
+        assert_int_equal(watch_is_behind(w), 1);
+        const uint32_t next = row < 3 ? give_stream(row == 0 ? 0 : NATIVE_EV_SCAN_END) : 1;
+        if (row == 1 || row == 3) give_telemetry(next, HEAD_IDLE, 1);
+        if (row == 4) give_scan_end();
+        free(observed());
+        assert_int_equal(watch_is_behind(w), 0);
+        atomic_store(&w->is_deaf, 0);
+        assert_int_equal(watch_is_behind(w), row == 2);
+        close_watch();
+    }
+}
+
 /* Frames that the head left out for this reader are counted, and frames after a scan's end are none of its points. */
 static void what_comes_after_the_end_does_not_count(void **state)
 {
@@ -293,6 +334,10 @@ static void what_comes_after_the_end_does_not_count(void **state)
     same("lost", number(quality, "{", "lost_frames"), 5, 0);
     free(quality);
     assert_int_equal(w->missed, 1);
+    struct web_body body;
+    assert_int_equal(w->source.get(w->source.ctx, "/past", "", &body, &err), SH_OK);
+    assert_int_equal(le_get64((const uint8_t *)body.bytes + 40), 5);
+    free(body.bytes);
     close_watch();
 }
 
@@ -365,6 +410,7 @@ int main(void)
         cmocka_unit_test(a_scan_is_judged_as_by_the_report),
         cmocka_unit_test(stations_follow_each_other),
         cmocka_unit_test(telemetry_ends_a_scan),
+        cmocka_unit_test(the_observer_is_behind_until_the_end),
         cmocka_unit_test(what_comes_after_the_end_does_not_count),
         cmocka_unit_test(points_in_mirrors_are_left_out),
         cmocka_unit_test(another_head_s_stations_are_passed_over),

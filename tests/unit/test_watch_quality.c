@@ -86,7 +86,7 @@ static void each_key(void **state)
     w.seen = (struct watch_seen){.coverage = (struct coverage *)&some_cells, .cell_m = 0.25, .n_cells = 91};
     w.shown_seen = 92;
     w.shown_share = 0.125;
-    w.shown_lost = 93;
+    w.lost_frames = 93;
     snprintf(expected, sizeof expected,
              "{%s,\"along_beam\":{\"from_m\":-1.5,\"width_m\":0.5,\"below\":54,\"above\":55,\"counts\":[51,52,53]},"
              "\"coverage\":{\"cell_m\":0.25,\"cells\":91,\"seen\":92,\"share\":0.125},\"lost_frames\":93,\"stations\":["

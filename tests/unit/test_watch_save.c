@@ -4,6 +4,7 @@
 #include "tests/unit/commands_rig.h"
 
 #include <dirent.h>
+#include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
 #include <stdatomic.h>
@@ -15,9 +16,12 @@
 #include <unistd.h>
 
 #include "drivers/host/scanhead.h"
+#include "drivers/protocol/native_encode.h"
 #include "firmware_sim/app/studio/watch/save.h"
 
 static struct past *past;
+static int n_behind; /* so often the observer is asked before it has read a scan's end */
+static struct scanhead *rest;
 static struct save *save;
 static struct sh_err err;
 static atomic_int n_lowered, lowered_to;
@@ -39,24 +43,33 @@ static void set_temporary(const char *name)
     setenv("TMPDIR", path, 1);
 }
 
-/* The scan of a floor, as a recording and as frames that a head keeps. */
+/* Takes the frames of the recording, up to so many points frames. Returns whether there are more. */
+static int take_frames(struct past *to, struct scanhead *sh, uint32_t n_points)
+{
+    struct scanhead_frame frame;
+    while (scanhead_next(sh, &frame, -1) == 0) {
+        past_take(to, &frame);
+        if (frame.type == SCANHEAD_POINTS && --n_points == 0) return 1;
+    }
+    return 0;
+}
+
+/* Two scans of a floor, as a recording and as frames that a head keeps. */
 static int go_there(void **state)
 {
     (void)state;
     struct scanhead *sh;
-    struct scanhead_frame frame;
     const struct past_limits limits = {PAST_MOST_POINTS, PAST_MOST_BYTES};
     if (commands_begin() != 0) return -1;
     write_text("floor.obj", "o floor\nv -30 -30 0\nv 30 -30 0\nv 30 30 0\nv -30 30 0\nf 1 2 3 4\n");
     write_text("c.yaml",
                "head: {profile: sphere, step_deg: 10}\nscene: {meshes: [{file: floor.obj, up: z, scale: 1}]}\n"
-               "stations: [{position_m: [0, 0, 2]}]\noutput: {crs: local}\n");
-    does(&app_record, "c.yaml -o s.shs -o s.ply --quiet", 0);
+               "stations: [{position_m: [0, 0, 2]}, {position_m: [3, 0, 2]}]\noutput: {crs: local}\n");
+    does(&app_record, "c.yaml -o s.shs -o s.ply --station all --quiet", 0);
     past = past_create(&limits);
     assert_non_null(past);
     assert_int_equal(scanhead_open("s.shs", &sh, NULL, 0), 0);
-    while (scanhead_next(sh, &frame, -1) == 0)
-        past_take(past, &frame, 7);
+    assert_int_equal(take_frames(past, sh, UINT32_MAX), 0);
     scanhead_close(sh);
     return mkdir("t", 0777);
 }
@@ -72,7 +85,7 @@ static int open_save(void **state)
     (void)state;
     set_temporary("t");
     atomic_store(&n_lowered, 0);
-    save = save_create(past);
+    save = save_create(&(struct save_source){.past = past});
     return save == NULL;
 }
 
@@ -161,31 +174,133 @@ static size_t bytes_of(const char *path)
 
 /* ---- tests */
 
-static void the_file_is_that_of_a_recording(void **state)
+/* The headers differ in comments alone, which say how the files were made. */
+static void same_points(const char *got, size_t len)
 {
-    (void)state;
-    char want[200], folder[600];
-    size_t len;
-    struct web_body body;
-    expect_state("", "{\"state\":\"idle\",\"as\":\"\",\"file\":0,\"bytes\":0,\"gone\":0,\"lost_frames\":0}\n");
-    assert_int_equal(save_get(save, "as=ply", &body, &err), SH_OK);
-    has(body.bytes, "\"as\":\"ply\",\"file\":1,");
-    free(body.bytes);
-    wait_for_file();
-    assert_true(atomic_load(&n_lowered) == 1 && atomic_load(&lowered_to) == 19);
-    char *got = fetch(1, &len);
-    snprintf(want, sizeof want,
-             "{\"state\":\"done\",\"as\":\"ply\",\"file\":1,\"bytes\":%zu,\"gone\":0,\"lost_frames\":7}\n", len);
-    expect_state("", want);
-    /* The headers differ in comments alone, which say how the files were made. */
     char *recorded = contents("s.ply");
     const char *from = strstr(got, "end_header"), *points = strstr(recorded, "end_header");
     const size_t n = bytes_of("s.ply") - (size_t)(points - recorded);
     assert_int_equal(len - (size_t)(from - got), n);
     assert_memory_equal(from, points, n);
-    free(got);
     free(recorded);
+}
+
+/* Makes a PLY. Standard error goes to a file meanwhile: nobody asked the head for a recorder's words. */
+static void make_ply(void)
+{
+    const int shown = dup(2), on_file = open("stderr", O_CREAT | O_TRUNC | O_WRONLY | O_CLOEXEC, 0666);
+    struct web_body body;
+    assert_true(shown >= 0 && dup2(on_file, 2) == 2);
+    const int rc = save_get(save, "as=ply", &body, &err);
+    if (rc == SH_OK) wait_for_file();
+    dup2(shown, 2);
+    close(shown);
+    close(on_file);
+    assert_int_equal(rc, SH_OK);
+    has(body.bytes, "\"as\":\"ply\",\"file\":1,");
+    free(body.bytes);
+    assert_int_equal(bytes_of("stderr"), 0);
+}
+
+static void the_file_is_that_of_a_recording(void **state)
+{
+    (void)state;
+    char want[200], folder[600];
+    size_t len;
+    expect_state("", "{\"state\":\"idle\",\"as\":\"\",\"file\":0,\"bytes\":0,\"gone\":0,\"lost_frames\":0}\n");
+    make_ply();
+    assert_true(atomic_load(&n_lowered) == 1 && atomic_load(&lowered_to) == 19);
+    char *got = fetch(1, &len);
+    snprintf(want, sizeof want,
+             "{\"state\":\"done\",\"as\":\"ply\",\"file\":1,\"bytes\":%zu,\"gone\":0,\"lost_frames\":0}\n", len);
+    expect_state("", want);
+    has(got, "comment frames_lost 0 reader_lost 0 ");
+    same_points(got, len);
+    free(got);
     assert_int_equal(files_below(folder), 1); /* the file of the frames is gone */
+}
+
+static struct scanhead *open_frames(struct past **to)
+{
+    struct scanhead *sh;
+    const struct past_limits limits = {PAST_MOST_POINTS, PAST_MOST_BYTES};
+    *to = past_create(&limits);
+    assert_non_null(*to);
+    assert_int_equal(scanhead_open("s.shs", &sh, NULL, 0), 0);
+    return sh;
+}
+
+static char *saved_ply(const struct save_source *source, size_t *len)
+{
+    save_free(save);
+    save = save_create(source);
+    assert_non_null(save);
+    make_ply();
+    return fetch(1, len);
+}
+
+/* Frames that the observer lost are missing in the file, and its header counts them, and no others. The end of the
+ * first scan is among them. */
+static void lost_frames_are_counted(void **state)
+{
+    (void)state;
+    uint8_t raw[512];
+    size_t len;
+    struct past *part;
+    struct scanhead_frame frame;
+    struct scanhead *sh = open_frames(&part);
+    const struct native_event event = {.code = NATIVE_EV_READER_LOST, .a = 653, .c = 653};
+    const struct scanhead_frame lost = {
+        .type = SCANHEAD_EVENT,
+        .flags = SCANHEAD_LOCAL,
+        .event = SCANHEAD_EV_READER_LOST,
+        .event_value = {653, 0, 653},
+        .raw = raw,
+        .raw_len = native_encode_event(raw, sizeof raw, &event, 0, NATIVE_LOCAL),
+    };
+    assert_int_equal(take_frames(part, sh, 4), 1);
+    do
+        assert_int_equal(scanhead_next(sh, &frame, -1), 0);
+    while (frame.type != SCANHEAD_EVENT || frame.event != SCANHEAD_EV_SCAN_END);
+    past_take(part, &lost);
+    assert_int_equal(take_frames(part, sh, UINT32_MAX), 0);
+    scanhead_close(sh);
+    char *got = saved_ply(&(struct save_source){.past = part}, &len);
+    has(got, "comment frames_lost 653 reader_lost 653 ");
+    expect_error("as=obj", SH_EINPUT, "as=obj: allowed are las, ply, e57, ptx, pcapng");
+    struct web_body body;
+    assert_int_equal(save_get(save, "", &body, &err), SH_OK); /* a wrong question does not undo the file */
+    has(body.bytes, "\"state\":\"done\"");
+    has(body.bytes, "\"lost_frames\":653}");
+    free(body.bytes);
+    free(got);
+    close_save(state);
+    past_free(part);
+}
+
+/* The observer reads the rest of the scan while the thread waits. */
+static int is_behind(void *ctx)
+{
+    if (--n_behind > 0) return 1;
+    assert_int_equal(take_frames(ctx, rest, UINT32_MAX), 0);
+    return 0;
+}
+
+static void the_end_of_a_scan_is_waited_for(void **state)
+{
+    (void)state;
+    size_t len;
+    struct past *part;
+    rest = open_frames(&part);
+    assert_int_equal(take_frames(part, rest, 4), 1);
+    n_behind = 3;
+    char *got = saved_ply(&(struct save_source){part, is_behind, part}, &len);
+    assert_int_equal(n_behind, 0);
+    same_points(got, len);
+    free(got);
+    close_save(state);
+    scanhead_close(rest);
+    past_free(part);
 }
 
 /* The next file takes the place of the last one, in the same folder. */
@@ -248,12 +363,32 @@ static void wrong_questions(void **state)
     assert_int_equal(save_get(save, "as=las", &body, &err), SH_EIO);
     has(err.text, "/nowhere/scanhead-save-");
     has(err.text, ": No such file or directory");
+    assert_int_equal(save_get(save, "", &body, &err), SH_EIO);
+    has(err.text, "/nowhere/scanhead-save-");
+    char name[500];
+    memset(name, 'x', sizeof name);
+    name[sizeof name - 1] = '\0';
+    setenv("TMPDIR", name, 1);
+    assert_int_equal(save_get(save, "as=las", &body, &err), SH_EIO);
+    has(err.text, "TMPDIR has 499 bytes; allowed are up to 378: xxxxx");
     set_temporary("t");
     assert_int_equal(save_get(save, "as=las", &body, &err), SH_OK); /* it goes on */
     has(body.bytes, "\"file\":1,");
     free(body.bytes);
     wait_for_file();
     assert_int_equal(save_get_piece(save, "file=2", &body, &err), SH_EINPUT);
+    /* A file that can't even be begun takes the place of the last one, too. */
+    char folder[600], command[700];
+    files_below(folder);
+    snprintf(command, sizeof command, "rm -r %s", folder);
+    assert_int_equal(system(command), 0);
+    set_temporary("nowhere");
+    assert_int_equal(save_get(save, "as=ply", &body, &err), SH_EIO);
+    for (int page = 0; page < 2; page++) {
+        assert_int_equal(save_get(save, "", &body, &err), SH_EIO);
+        has(err.text, "/nowhere/scanhead-save-");
+    }
+    assert_int_equal(save_get_piece(save, "file=1", &body, &err), SH_EINPUT);
 }
 
 /* Each page that asks is told why there is no file. A limit of a file's length stands for a full disk. */
@@ -316,6 +451,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(the_file_is_that_of_a_recording, open_save, close_save),
+        cmocka_unit_test_setup_teardown(lost_frames_are_counted, open_save, close_save),
+        cmocka_unit_test_setup_teardown(the_end_of_a_scan_is_waited_for, open_save, close_save),
         cmocka_unit_test_setup_teardown(one_file_is_there_at_a_time, open_save, close_save),
         cmocka_unit_test_setup_teardown(wrong_questions, open_save, close_save),
         cmocka_unit_test_setup_teardown(a_failure_leaves_nothing, open_save, close_save),

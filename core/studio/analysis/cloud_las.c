@@ -8,7 +8,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { HEADER_MIN = 227, HEADER_14 = 375, VLR_HEAD = 54, EXTRA_LEN = 192, EXTRA_UINT16 = 3, N_FORMATS = 11 };
+enum {
+    HEADER_MIN = 227,
+    HEADER_13 = 235,
+    HEADER_14 = 375,
+    VLR_HEAD = 54,
+    EVLR_HEAD = 60,
+    EXTRA_LEN = 192,
+    EXTRA_UINT16 = 3,
+    N_FORMATS = 11
+};
 
 /* By format: the length of a point's record without extra bytes; where its GPS time and its colours are, 0: nowhere. */
 static const unsigned standard_len[N_FORMATS] = {20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67};
@@ -189,6 +198,27 @@ static int read_points(struct las *las, struct sh_err *err)
     return SH_OK;
 }
 
+/* Extended records follow the points: the last of them ends the file. Waveforms in the file are such a record, which
+ * version 1.3 has without a count. */
+static uint64_t end_of_records(const struct las *las)
+{
+    const uint8_t *d = las->data;
+    const uint64_t size = las->t.size, header_len = le_get16(d + 94) < size ? le_get16(d + 94) : size;
+    uint64_t end = las->points_at + las->n * las->record_len, at = 0, n = 0;
+    if (d[25] >= 3 && header_len >= HEADER_13) at = le_get64(d + 227);
+    if (at != 0) n = 1;
+    if (d[25] == 4 && header_len >= HEADER_14 && le_get32(d + 243) != 0) {
+        at = le_get64(d + 235);
+        n = le_get32(d + 243);
+    }
+    for (; n > 0 && at < size && size - at >= EVLR_HEAD; n--) {
+        const uint64_t room = size - at - EVLR_HEAD, len = le_get64(d + at + 20);
+        at += EVLR_HEAD + (len < room ? len : room);
+        if (at > end) end = at;
+    }
+    return end;
+}
+
 static int progress(void *ctx, double fraction, struct sh_err *err)
 {
     const struct las *las = ctx;
@@ -210,6 +240,9 @@ int cloud_read_las(const char *path, unsigned columns, const struct sh_report *r
         out->has_own_counts = is_ours(&las);
         rc = read_points(&las, err);
     }
+    if (rc == SH_OK && end_of_records(&las) < las.t.size)
+        sh_warn(report, "%s: %llu bytes after the last point ignored", path,
+                (unsigned long long)(las.t.size - end_of_records(&las)));
     text_close(&las.t);
     return rc;
 }

@@ -6,10 +6,13 @@
 
 #include "core/studio/picture/inside.h"
 
-/* libpng reports errors by a callback that must not return. */
+/* libpng reports errors by a callback that must not return. Where a write fails libpng has only "Write Error", and the
+ * system has the reason. */
 static void on_error(png_structp png, png_const_charp text)
 {
-    sh_fail(png_get_error_ptr(png), SH_EIO, "%s", text);
+    const int why = errno;
+    FILE *file = png_get_io_ptr(png);
+    sh_fail(png_get_error_ptr(png), SH_EIO, "%s", file != NULL && ferror(file) && why != 0 ? strerror(why) : text);
     png_longjmp(png, 1);
 }
 

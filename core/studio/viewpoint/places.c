@@ -12,6 +12,9 @@ enum { LEGS = 8, LOOKS = 2 * LEGS, TOGETHER = BVH_CHUNK / LOOKS };
 
 static const double LEVEL = 0.9397; /* cosine of a floor's slope, 20 degrees */
 static const double ABOVE_M = 0.2, AROUND_M = 0.3, LEVEL_M = 0.15;
+/* The rays of a place begin at least so far above its floor: the floor around it may be LEVEL_M higher. ABOVE_M says
+ * that there is room for that. */
+static const double LEAST_LOOK_M = 0.16;
 
 struct search {
     struct survey survey;
@@ -56,10 +59,16 @@ static int places_compare(const void *a, const void *b)
     return (p->position_m[2] < q->position_m[2]) - (p->position_m[2] > q->position_m[2]);
 }
 
+/* How far above the head's height the rays of a place begin. */
+static double lift_m(const struct search *s)
+{
+    return fmax(LEAST_LOOK_M - s->grid->height_m, 0.0);
+}
+
 /* Adds the rays of one place: down around it, and outward from the head. */
 static void add_looks(struct search *s, const struct viewpoint_place *p)
 {
-    const double *at = p->position_m;
+    const double at[3] = {p->position_m[0], p->position_m[1], p->position_m[2] + lift_m(s)};
     for (int i = 0; i < LEGS; i++) {
         const double turn = 2.0 * M_PI * i / LEGS, x = sin(turn), y = cos(turn);
         survey_add(&s->survey, (const double[3]){at[0] + AROUND_M * x, at[1] + AROUND_M * y, at[2]}, survey_down);
@@ -69,7 +78,7 @@ static void add_looks(struct search *s, const struct viewpoint_place *p)
 
 static int stands(const struct search *s, uint32_t first)
 {
-    const double height_m = s->grid->height_m, *range_m = s->survey.rays.range_m + first;
+    const double height_m = s->grid->height_m + lift_m(s), *range_m = s->survey.rays.range_m + first;
     int level = 0, free_around = 1;
     for (int i = 0; i < LEGS; i++) {
         level += fabs(range_m[2 * i] - height_m) <= LEVEL_M;

@@ -16,6 +16,7 @@ struct coverage_next_options {
     double step_deg;        /* between rays */
     int step_given;         /* --step-deg is there, which is an error where rays are pulses of the head */
     long scans;             /* how many of the best places are scanned in each round */
+    int of_page;            /* errors name keys of the page's query, and no options of a command */
 };
 
 enum coverage_place { COVERAGE_PLACE_OPEN, COVERAGE_PLACE_WITHIN, COVERAGE_PLACE_CHOSEN };

@@ -25,13 +25,25 @@ static int add_place(struct coverage_finder *f, const struct coverage_next_place
     return SH_OK;
 }
 
+/* The page has no options of a command line. */
+static int fail_no_place(const struct coverage_finder *f, struct sh_err *err)
+{
+    const double room_m = f->o->height_m + 0.2;
+    if (f->o->of_page)
+        return sh_fail(err, SH_EINPUT,
+                       "no place to stand: no floor has %.3g m of room above it; allowed is another height_m", room_m);
+    return sh_fail(err, SH_EINPUT,
+                   "--grid %g: no place to stand: no floor there has %.3g m of room above it; allowed is another grid, "
+                   "--height or --at",
+                   f->o->grid_m, room_m);
+}
+
 static int check_upright(const struct coverage_finder *f, struct sh_err *err)
 {
     const struct placement_anchor *anchor = &f->site->anchor;
     if (!anchor->known || anchor->frame.kind != GEOFRAME_ECEF) return SH_OK;
-    return sh_fail(err, SH_EINPUT,
-                   "%s: scene.anchor.source: ecef, where z is not up, so a grid has no floors; allowed is --candidates",
-                   site_file(f->site));
+    return sh_fail(err, SH_EINPUT, "%s: scene.anchor.source: ecef, where z is not up, so a grid has no floors%s",
+                   site_file(f->site), f->o->of_page ? "" : "; allowed is --candidates");
 }
 
 static int find_on_grid(struct coverage_finder *f, struct sh_err *err)
@@ -57,13 +69,7 @@ static int find_on_grid(struct coverage_finder *f, struct sh_err *err)
         rc = add_place(f, &place, err);
     }
     free(found);
-    if (rc == SH_OK && n == 0)
-        rc = sh_fail(
-            err, SH_EINPUT,
-            "--grid %g: no place to stand: no floor there has %.3g m of room above it; allowed is another grid, "
-            "--height or --at",
-            f->o->grid_m, f->o->height_m + 0.2);
-    return rc;
+    return rc == SH_OK && n == 0 ? fail_no_place(f, err) : rc;
 }
 
 enum { X, Y, Z, HEADING };

@@ -30,6 +30,7 @@ struct init_run {
     const char *output;
     int force;
     char default_output[CONFIG_PATH_LEN], name[128]; /* of the configuration; of the mesh, as shown */
+    char path[CONFIG_PATH_LEN];                      /* of the mesh, as the configuration names it */
     struct init_mesh as;
 };
 
@@ -98,6 +99,18 @@ static int find_path(const struct init_run *run, char path[CONFIG_PATH_LEN], str
     if (n < 0 || used + (size_t)n >= CONFIG_PATH_LEN)
         return sh_fail(err, SH_EINPUT, "%s: its path is too long; allowed up to %d bytes", run->name,
                        CONFIG_PATH_LEN - 1);
+    return SH_OK;
+}
+
+/* A key that names a file takes no such text. */
+static int check_path(const struct init_run *run, struct sh_err *err)
+{
+    for (const char *p = run->path; *p != '\0'; p++)
+        if ((unsigned char)*p < 0x20 || *p == 0x7f)
+            return sh_fail(
+                err, SH_EINPUT,
+                "%s: its path has control characters, so no key can name it; allowed is a path without: rename it",
+                run->name);
     return SH_OK;
 }
 
@@ -179,17 +192,16 @@ static void say_result(const struct init_run *run, const struct scene *s, const 
 
 static int write_config(struct init_run *run, const struct scene *scene, struct sh_err *err)
 {
-    char path[CONFIG_PATH_LEN], link[64];
+    char link[64];
     const char *base = base_of(run->output);
     struct config_profile profile;
     struct viewpoint at;
     int stem = (int)(strrchr(base, '.') - base);
     int rc = find_place(run, scene, &profile, &at, err);
-    if (rc == SH_OK) rc = find_path(run, path, err);
     if (rc != SH_OK) return rc;
     snprintf(link, sizeof link, "%.*s.tty", stem, base);
     struct init_text text = {.mesh_name = run->name,
-                             .mesh_path = path,
+                             .mesh_path = run->path,
                              .link_name = stem + 5 <= (int)sizeof link ? link : NULL,
                              .scene = scene,
                              .mesh = &run->as,
@@ -229,6 +241,8 @@ static int init(struct init_run *run, struct sh_err *err)
         return sh_fail(err, SH_EINPUT, "%s already exists; give another name with -o, or --force to replace it",
                        run->output);
     int rc = app_check_files(&run->in, NULL, err);
+    if (rc == SH_OK) rc = find_path(run, run->path, err);
+    if (rc == SH_OK) rc = check_path(run, err);
     if (rc == SH_OK) rc = init_load_mesh(&run->wish, run->name, &scene, &run->as, err);
     if (rc == SH_OK) rc = write_config(run, scene, err);
     scene_free(scene);

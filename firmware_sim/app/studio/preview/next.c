@@ -118,8 +118,9 @@ struct stand {
 static int stand_open(const struct preview_work *work, const struct preview_request *r, const struct preview_seen *seen,
                       struct stand *s, struct sh_err *err)
 {
-    *s = (struct stand){.options = {.stations = 1, .height_m = r->height_m, .step_deg = RAYS_DEG, .scans = SCANS},
-                        .result = {.base = r->station, .cell_m = work->options->cell_m}};
+    *s = (struct stand){
+        .options = {.stations = 1, .height_m = r->height_m, .step_deg = RAYS_DEG, .scans = SCANS, .of_page = 1},
+        .result = {.base = r->station, .cell_m = work->options->cell_m}};
     if (coverage_cells(work->coverage) == 0)
         return sh_fail(err, SH_ESTATE, "the scene has too many triangles for coverage, so no place can be suggested");
     int rc = preview_site_open(work, r, &s->scanner, err);

@@ -121,6 +121,14 @@ static int job_follow(struct record_job *r, struct scanhead *sh, struct sh_err *
     return app_and_also(rc, after, &why, err);
 }
 
+static void warn_of_order(const struct recording_result *result)
+{
+    char order[256];
+    if (recording_describe_order(result, order, sizeof order))
+        sh_warn(&app_report_stderr, "the stream was not in order: %s", order);
+    app_warn_left_out(result->crowded, result->unfit, result->lost_samples);
+}
+
 static void warn_of_little(const struct record_job *r)
 {
     const struct recording_result *result = &r->result;
@@ -138,7 +146,8 @@ static int record(struct record_job *r, struct scanhead *sh, struct sh_err *err)
 {
     struct recording_result *result = &r->result;
     r->recording.hash = (r->hash || r->stats != NULL) && !r->no_hash;
-    r->notes = (struct sh_report){r, print_note, r->recording.progress ? app_report_seconds.progress : NULL, gives_up};
+    r->notes = (struct sh_report){r, r->silent ? NULL : print_note,
+                                  r->recording.progress ? app_report_seconds.progress : NULL, gives_up};
     r->files.recorder.report = &r->notes;
     int rc = open_files(r, err);
     if (rc != SH_OK) {
@@ -150,14 +159,11 @@ static int record(struct record_job *r, struct scanhead *sh, struct sh_err *err)
     r->recording.second = save_files;
     r->recording.ctx = r;
     r->recording.interrupted = app_interrupted;
-    r->recording.report = &app_report_stderr;
+    r->recording.report = r->silent ? NULL : &app_report_stderr;
     rc = job_follow(r, sh, err);
     if (rc == SH_OK || result->points != 0) say_result(r);
-    char order[256];
-    if (recording_describe_order(result, order, sizeof order))
-        sh_warn(&app_report_stderr, "the stream was not in order: %s", order);
-    app_warn_left_out(result->crowded, result->unfit, result->lost_samples);
-    if (rc == SH_OK) warn_of_little(r);
+    if (!r->silent) warn_of_order(result);
+    if (rc == SH_OK && !r->silent) warn_of_little(r);
     return rc == SH_OK && !r->may_end ? recording_check_complete(result, err) : rc;
 }
 

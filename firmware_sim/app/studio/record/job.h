@@ -24,6 +24,7 @@ struct record_job {
     struct site *site; /* of record_job_off_line: loaded by offline_load, of cfg; NULL: it loads one itself */
     int only_whole;    /* 1: an incomplete recording leaves no files */
     int brief;         /* 1: prints no line about the result */
+    int silent;        /* 1: prints no warnings either */
     int may_end;       /* of record_job_stream: the stream may end within a scan, and what came until then is all */
     /* Asked often, by the thread of the job: 1 ends it, and it leaves no files. NULL: never. */
     int (*stop)(void *ctx);

@@ -88,7 +88,6 @@ struct watch {
     int missed;           /* frames were lost on the way here: a scan's end may be among them */
     int dirty;            /* something came since the last figures */
     int64_t began_ns, began_thread_ns, published_ns, publish_ns;
-    uint64_t lost_frames;
 
     struct past *past; /* the observer fills it */
     struct save *save;
@@ -104,7 +103,9 @@ struct watch {
     struct watch_scan *shown_station; /* [n_stations] the last scan of each; scan 0: none */
     uint32_t shown_seen;
     double shown_share;
-    uint64_t shown_lost;
+    uint64_t lost_frames; /* as the head said last */
+    atomic_uint ended;    /* the last scan whose end the observer has read, by its number; 0: none */
+    atomic_int is_deaf;   /* the observer reads no more */
 };
 
 /* ---- scene.c */
@@ -116,6 +117,8 @@ void watch_put_plan(struct json *json, const void *ctx);
 
 /* ---- observe.c */
 void *watch_observe(void *watch);
+/* Whether the head's last scan is over, and the observer has not read its end yet. Any thread may ask. */
+int watch_is_behind(void *watch);
 
 /* ---- sample.c */
 int watch_sample_open(struct watch *w, struct sh_err *err);

@@ -80,6 +80,7 @@ static void end_scan(struct watch *w)
 {
     if (w->at.scan == 0 || w->at.over) return;
     w->at.over = 1;
+    atomic_store(&w->ended, w->at.scan);
     watch_publish(w);
     w->at.in_scene = 0; /* no more points of this scan come, and its site is given back */
     let_go(w);
@@ -159,20 +160,37 @@ static void observe_take_points(struct watch *w, const struct scanhead_frame *fr
 
 /* ---- the thread */
 
+int watch_is_behind(void *watch)
+{
+    struct watch *w = watch;
+    const uint32_t scan = device_last_scan(w->options.device, NULL);
+    if (scan == 0 || scan == atomic_load(&w->ended) || atomic_load(&w->is_deaf)) return 0;
+    return device_scan_ns(w->options.device) != 0;
+}
+
 /* The events of a scan's start and end, and all of its points, may be among the lost frames. */
 static void take_telemetry(struct watch *w, const struct scanhead_frame *frame)
 {
     struct native_telemetry t;
     if (native_decode_telemetry(frame->payload, frame->payload_len, &t) != SH_OK || t.scan == 0) return;
     if (t.state == HEAD_SCANNING || t.state == HEAD_SPIN_DOWN) return;
+    atomic_store(&w->ended, t.scan);
     if (t.scan != w->at.scan && !follow_scan(w)) return;
     if (t.scan == w->at.scan) end_scan(w);
+}
+
+static void note_lost(struct watch *w, uint64_t in_all)
+{
+    w->missed = 1;
+    pthread_mutex_lock(&w->lock);
+    w->lost_frames = in_all;
+    pthread_mutex_unlock(&w->lock);
 }
 
 static void take_frame(struct watch *w, const struct scanhead_frame *frame)
 {
     struct sh_err err;
-    past_take(w->past, frame, w->lost_frames);
+    past_take(w->past, frame);
     if (frame->type == SCANHEAD_POINTS && follow_scan(w)) {
         observe_take_points(w, frame);
         if (w->sample.n - w->sample.done >= WATCH_BATCH && watch_sample_compare(w, &err) != SH_OK)
@@ -180,7 +198,8 @@ static void take_frame(struct watch *w, const struct scanhead_frame *frame)
     }
     if (frame->type == SCANHEAD_TELEMETRY) take_telemetry(w, frame);
     if (frame->type != SCANHEAD_EVENT) return;
-    if (frame->event == SCANHEAD_EV_READER_LOST) w->missed = 1;
+    if (frame->event == SCANHEAD_EV_READER_LOST) note_lost(w, frame->event_value[2]);
+    if (frame->event == SCANHEAD_EV_SCAN_END) atomic_store(&w->ended, (uint32_t)frame->event_value[0]);
     if (frame->event == SCANHEAD_EV_SCAN_END || frame->event == SCANHEAD_EV_SCAN_START) end_scan(w);
 }
 
@@ -235,6 +254,7 @@ void *watch_observe(void *watch)
             rest(w);
         if (is_due(w)) watch_publish(w);
     }
+    atomic_store(&w->is_deaf, 1);
     if (w->dirty) watch_publish(w);
     let_go(w);
     return NULL;

@@ -12,7 +12,9 @@
 
 enum {
     VERSION = 1,
-    ROOM = PAST_PIECE + 4 * NATIVE_MAX_FRAME, /* a piece ends after the block of points that fills it */
+    LOST_ROOM = 256, /* for a READER_LOST, which takes about 150 bytes */
+    /* A piece ends after the block of points that fills it. */
+    ROOM = PAST_PIECE + 4 * NATIVE_MAX_FRAME + LOST_ROOM,
     MOST_PIECES = 2 * (PAST_MOST_BYTES / PAST_PIECE),
 };
 
@@ -35,8 +37,10 @@ struct past {
     uint64_t run; /* another one in each run of a head */
     /* only for the thread that takes frames */
     struct placing placing[KINDS];
-    int is_new;     /* one of `placing` is not in the last piece yet */
-    int after_pose; /* the last frame had poses: the points that need them follow */
+    int is_new;          /* one of `placing` is not in the last piece yet */
+    struct placing lost; /* the last READER_LOST, which has the sum of all */
+    int lost_is_new;     /* it is not in the last piece yet */
+    int after_pose;      /* the last frame had poses: the points that need them follow */
 
     pthread_mutex_t lock; /* of all below */
     struct piece piece[MOST_PIECES];
@@ -63,6 +67,7 @@ void past_free(struct past *past)
         free(past->piece[i].bytes);
     for (int k = 0; k < KINDS; k++)
         free(past->placing[k].frame);
+    free(past->lost.frame);
     pthread_mutex_destroy(&past->lock);
     free(past);
 }
@@ -120,15 +125,27 @@ static void append_placing(struct past *past, struct piece *piece, int again)
     }
 }
 
+/* The report stands where the loss was, or in the first piece, and in each later piece, marked as repeated. */
+static void append_lost(struct past *past, struct piece *piece)
+{
+    uint8_t *at = piece->bytes + piece->len;
+    if (past->lost.frame == NULL) return;
+    append(past, piece, past->lost.frame, past->lost.len);
+    if (!past->lost_is_new) at[3] |= NATIVE_REPEAT;
+    native_finish_frame(at, 0);
+    past->lost_is_new = 0;
+}
+
 /* The piece that a frame goes into; NULL: no memory. */
 static struct piece *find_piece(struct past *past, const struct scanhead_frame *frame)
 {
     struct piece *last = past->n > 0 ? piece_at(past, past->n - 1) : NULL;
     const int may_begin = frame->type == SCANHEAD_POSES || (frame->type == SCANHEAD_POINTS && !past->after_pose);
-    const size_t need = frame->raw_len + KINDS * (size_t)NATIVE_MAX_FRAME;
+    const size_t need = frame->raw_len + KINDS * (size_t)NATIVE_MAX_FRAME + LOST_ROOM;
     if (last != NULL && !(may_begin && last->len >= PAST_PIECE) && last->len + need <= ROOM) {
         if (past->is_new) append_placing(past, last, 0);
         past->is_new = 0;
+        if (past->lost_is_new) append_lost(past, last);
         return last;
     }
     if (past->n == MOST_PIECES) drop_oldest(past);
@@ -138,6 +155,7 @@ static struct piece *find_piece(struct past *past, const struct scanhead_frame *
     past->n++;
     append_placing(past, last, !past->is_new);
     past->is_new = 0;
+    append_lost(past, last);
     return last;
 }
 
@@ -179,10 +197,23 @@ static void take_placing(struct past *past, int kind, const struct scanhead_fram
     }
 }
 
-void past_take(struct past *past, const struct scanhead_frame *frame, uint64_t lost_frames)
+/* READER_LOST comes to this taker alone: it has no number. */
+static void take_lost(struct past *past, const struct scanhead_frame *frame)
 {
-    if ((frame->flags & SCANHEAD_LOCAL) != 0) return;
-    pthread_mutex_lock(&past->lock);
+    if (frame->type != SCANHEAD_EVENT || frame->event != SCANHEAD_EV_READER_LOST) return;
+    past->lost_frames = frame->event_value[2];
+    uint8_t *copy = frame->raw_len <= LOST_ROOM ? realloc(past->lost.frame, frame->raw_len) : NULL;
+    if (copy == NULL) return; /* the next report has the sum */
+    memcpy(copy, frame->raw, frame->raw_len);
+    past->lost = (struct placing){copy, frame->raw_len};
+    past->lost_is_new = 1;
+    if (past->n == 0) return;
+    find_piece(past, frame); /* which appends the report */
+    keep_limits(past);
+}
+
+static void take_numbered(struct past *past, const struct scanhead_frame *frame)
+{
     switch (frame->type) {
     case SCANHEAD_DESCRIPTOR:
         take_placing(past, 0, frame);
@@ -200,11 +231,22 @@ void past_take(struct past *past, const struct scanhead_frame *frame, uint64_t l
         past_keep(past, frame);
         past->after_pose = frame->type == SCANHEAD_POSES;
         break;
+    case SCANHEAD_EVENT: /* it begins no piece */
+        if (frame->event == SCANHEAD_EV_SCAN_END && past->n > 0) past_keep(past, frame);
+        break;
     default:
         break;
     }
     past->next_seq = frame->seq + 1;
-    past->lost_frames = lost_frames;
+}
+
+void past_take(struct past *past, const struct scanhead_frame *frame)
+{
+    pthread_mutex_lock(&past->lock);
+    if ((frame->flags & SCANHEAD_LOCAL) != 0)
+        take_lost(past, frame);
+    else
+        take_numbered(past, frame);
     pthread_mutex_unlock(&past->lock);
 }
 

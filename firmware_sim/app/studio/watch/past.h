@@ -5,9 +5,10 @@
  * format). A piece begins with the descriptor, the emitter and the anchor that its points need, so that a reader of the
  * protocol can begin with any piece.
  *
- * The past keeps points with their attributes and colours, poses, and the frames that place them. The past keeps no
- * waveforms: those of one second may take as much memory as everything else. When there are more than `points` or
- * `bytes`, the oldest piece goes, and its points are counted as gone.
+ * The past keeps points with their attributes and colours, poses, the frames that place them, ends of scans, and
+ * reports of frames that the head left out for the taker (READER_LOST). The past keeps no waveforms: those of one
+ * second may take as much memory as everything else. When there are more than `points` or `bytes`, the oldest piece
+ * goes, and its points are counted as gone.
  *
  * Memory: pieces with room for PAST_PIECE bytes and four more frames, allocated as points come. All pieces together
  * hold up to `bytes` of frames. No piece is allocated before the first points or poses.
@@ -34,9 +35,9 @@ enum { PAST_PIECE = 1 << 20, PAST_MOST_BYTES = 320 << 20, PAST_HEAD_LEN = 56 };
 
 /* NULL: no memory. */
 struct past *past_create(const struct past_limits *limits);
-/* lost_frames: how many frames the taker has lost so far; readers get this number. Points for which there is no memory
- * count as gone. */
-void past_take(struct past *past, const struct scanhead_frame *frame, uint64_t lost_frames);
+/* Takes a frame as it came to the taker. The frames that the taker lost are those that READER_LOST reports. Points for
+ * which there is no memory count as gone. */
+void past_take(struct past *past, const struct scanhead_frame *frame);
 /* Gives the frames from a position on, up to its piece's end. A position whose piece has gone gives the oldest piece;
  * one beyond the end gives no frames. query: "from=POSITION", or "" for 0; else SH_EINPUT. SH_ENOMEM. */
 int past_get(struct past *past, const char *query, struct web_body *out, struct sh_err *err);

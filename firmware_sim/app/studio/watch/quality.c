@@ -18,21 +18,17 @@ static void show(struct watch *w)
     if (w->at.station != 0) w->shown_station[w->at.station - 1] = w->at;
     w->shown_seen = seen->n_seen;
     w->shown_share = seen->coverage != NULL ? seen->seen_m2 / seen->area_m2 : (double)NAN;
-    w->shown_lost = w->lost_frames;
     pthread_mutex_unlock(&w->lock);
 }
 
 void watch_publish(struct watch *w)
 {
     const int64_t from_ns = clock_thread_ns();
-    struct scanhead_stats stats;
     struct sh_err err;
     if (w->at.scan == 0) return;
     /* Where memory is short now, the earlier figures stay. */
     if (watch_sample_compare(w, &err) == SH_OK && watch_sample_figures(w, &err) == SH_OK) {
         w->at.seen_share = watch_seen_count(&w->seen, w->at.station, w->site->n_stations);
-        scanhead_get_stats(w->sh, &stats);
-        w->lost_frames = stats.reader_lost;
         show(w);
     }
     w->dirty = 0;
@@ -155,7 +151,7 @@ static void put_quality(struct json *json, const void *ctx)
     put_scan(json, &w->shown);
     report_put_histogram(json, w->shown.figures.along > 0 ? "along_beam" : "distances", &w->shown.histogram);
     put_coverage(json, w);
-    json_uint(json, "lost_frames", w->shown_lost);
+    json_uint(json, "lost_frames", w->lost_frames);
     put_stations(json, w);
     json_close_object(json);
 }

@@ -15,16 +15,21 @@
 #include <unistd.h>
 
 #include "core/bytes.h"
+#include "drivers/protocol/native_encode.h"
 #include "firmware_sim/app/studio/page_json.h"
 #include "firmware_sim/app/studio/page_query.h"
 #include "firmware_sim/app/studio/record/job.h"
 #include "firmware_sim/app/studio/watch/watch.h"
+#include "firmware_sim/base/clock.h"
 
 enum { AS_LEN = 9, FOLDER_LEN = 400, PATH_LEN = FOLDER_LEN + 32 };
 enum save_state { SAVE_IDLE, SAVE_WORKING, SAVE_DONE, SAVE_FAILED };
 
+/* While nothing more comes for so long, the end of a scan is waited for. */
+static const int64_t PATIENCE_NS = 10000000000, WAIT_NS = 5000000;
+
 struct save {
-    struct past *past;
+    struct save_source source;
     pthread_t thread;
     int has_thread;          /* it was begun, and not joined */
     atomic_int ends;         /* no file is wanted any more */
@@ -46,18 +51,24 @@ static int make_folder(struct save *s, struct sh_err *err)
 {
     const char *temporary = getenv("TMPDIR");
     if (s->folder[0] != '\0' && access(s->folder, W_OK) == 0) return SH_OK; /* else a service may have removed it */
-    snprintf(s->folder, sizeof s->folder, "%.300s/scanhead-save-XXXXXX",
-             temporary != NULL && temporary[0] != '\0' ? temporary : "/tmp");
+    if (temporary == NULL || temporary[0] == '\0') temporary = "/tmp";
+    const int n = snprintf(s->folder, sizeof s->folder, "%s/scanhead-save-XXXXXX", temporary);
+    if (n >= (int)sizeof s->folder) {
+        s->folder[0] = '\0';
+        return sh_fail(err, SH_EIO, "TMPDIR has %zu bytes; allowed are up to %zu: %.100s...", strlen(temporary),
+                       sizeof s->folder - sizeof "/scanhead-save-XXXXXX", temporary);
+    }
     if (mkdtemp(s->folder) != NULL) return SH_OK;
     const int rc = sh_fail(err, SH_EIO, "%s: %s", s->folder, strerror(errno));
     s->folder[0] = '\0';
     return rc;
 }
 
-static void note_missing(struct save *s, const uint8_t *head)
+/* first: it is the head of the first piece. Points that go later may be in the file. */
+static void note_missing(struct save *s, const uint8_t *head, int first)
 {
     pthread_mutex_lock(&s->lock);
-    s->gone = le_get64(head + 32);
+    if (first) s->gone = le_get64(head + 32);
     s->lost_frames = le_get64(head + 40);
     pthread_mutex_unlock(&s->lock);
 }
@@ -68,23 +79,78 @@ static int save_ends(void *self)
     return atomic_load(&s->ends);
 }
 
+static int get_end(const struct save *s, uint64_t *end, struct sh_err *err)
+{
+    char query[32];
+    struct web_body none;
+    snprintf(query, sizeof query, "from=%.0f", PAST_MOST_POSITION);
+    const int rc = past_get(s->source.past, query, &none, err);
+    if (rc != SH_OK) return rc;
+    *end = le_get64((const uint8_t *)none.bytes + 24);
+    free(none.bytes);
+    return SH_OK;
+}
+
+/* The observer reads the stream later than other clients do. One of them may have seen a scan's end, and then the file
+ * is to have the whole scan. */
+static int await_scan_end(struct save *s, struct sh_err *err)
+{
+    uint64_t end = 0, before = 0;
+    int64_t news_ns = clock_now_ns();
+    while (s->source.is_behind != NULL && s->source.is_behind(s->source.ctx) && !save_ends(s)) {
+        const int rc = get_end(s, &end, err);
+        if (rc != SH_OK) return rc;
+        const int64_t now_ns = clock_now_ns();
+        if (end != before) news_ns = now_ns;
+        if (now_ns - news_ns > PATIENCE_NS) return SH_OK;
+        before = end;
+        clock_sleep_until_ns(now_ns + WAIT_NS);
+    }
+    return SH_OK;
+}
+
+/* Numbers the frames anew: the past keeps only some kinds, and the others are no loss. Frames that the observer lost
+ * leave a gap, as they do in the stream that it read. */
+struct renumber {
+    uint32_t next;
+    uint64_t lost; /* in all, as READER_LOST says */
+};
+
+static void renumber(struct renumber *r, uint8_t *frames, size_t len)
+{
+    for (uint8_t *at = frames, *end = frames + len; at < end; at += native_frame_len(at)) {
+        struct native_header h;
+        struct native_event event;
+        native_read_header(at, &h);
+        if ((h.flags & NATIVE_LOCAL) == 0) {
+            native_finish_frame(at, r->next++);
+            continue;
+        }
+        if (h.type != NATIVE_EVENT ||
+            native_decode_event(at + NATIVE_HEADER_LEN, native_frame_len(at) - NATIVE_HEADER_LEN, &event) != SH_OK)
+            continue;
+        r->next += (uint32_t)(event.c - r->lost);
+        r->lost = event.c;
+    }
+}
+
 /* Writes the frames that there are now. Frames that come meanwhile are left out, except in the last piece: it is read
  * with all frames that it has by then. */
 static int write_frames(struct save *s, FILE *f, struct sh_err *err)
 {
     char query[32] = "";
+    struct renumber numbers = {0};
     for (uint64_t end = 0, next = 0;;) {
         struct web_body piece;
         if (save_ends(s)) return sh_fail(err, SH_ESTOPPED, "%s: stopped", s->stream);
-        const int rc = past_get(s->past, query, &piece, err);
+        const int rc = past_get(s->source.past, query, &piece, err);
         if (rc != SH_OK) return rc;
         const uint8_t *head = (const uint8_t *)piece.bytes;
         const size_t len = piece.len - PAST_HEAD_LEN;
         next = le_get64(head + 16);
-        if (end == 0) {
-            end = le_get64(head + 24);
-            note_missing(s, head);
-        }
+        note_missing(s, head, end == 0);
+        if (end == 0) end = le_get64(head + 24);
+        renumber(&numbers, (uint8_t *)piece.bytes + PAST_HEAD_LEN, len);
         const size_t written = fwrite(piece.bytes + PAST_HEAD_LEN, 1, len, f);
         free(piece.bytes);
         if (written != len) return sh_fail(err, SH_EIO, "%s: %s", s->stream, strerror(errno));
@@ -102,13 +168,13 @@ static int write_stream(struct save *s, struct sh_err *err)
     return rc;
 }
 
-/* This stream has no event of a scan's end, so for its reader it ends in the middle of a scan. */
+/* This stream may end in the middle of a scan. The recorder's warnings are not for those who run the head. */
 static int write_file(struct save *s, struct sh_err *err)
 {
     struct record_job *job = calloc(1, sizeof *job);
     if (job == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a file");
     job->source = s->stream;
-    job->brief = job->no_hash = job->may_end = 1;
+    job->brief = job->silent = job->no_hash = job->may_end = 1;
     job->stop = save_ends;
     job->stop_ctx = s;
     job->recording.frames = -1;
@@ -135,7 +201,8 @@ static void *make(void *self)
     struct sh_err err = {0};
     struct stat st = {0};
     setpriority(PRIO_PROCESS, (id_t)gettid(), WATCH_NICE);
-    int rc = write_stream(s, &err);
+    int rc = await_scan_end(s, &err);
+    if (rc == SH_OK) rc = write_stream(s, &err);
     if (rc == SH_OK) rc = write_file(s, &err);
     if (rc == SH_OK && stat(s->file, &st) != 0) rc = sh_fail(&err, SH_EIO, "%s: %s", s->file, strerror(errno));
     if (rc == SH_OK)
@@ -181,23 +248,31 @@ static int check_as(const char *as, struct sh_err *err)
     return sh_fail(err, SH_EINPUT, "as=%.32s: allowed are las, ply, e57, ptx, pcapng", as);
 }
 
+static int begin_thread(struct save *s, const char *as, struct sh_err *err)
+{
+    const int rc = make_folder(s, err);
+    if (rc != SH_OK) return rc;
+    s->number++;
+    snprintf(s->as, sizeof s->as, "%s", as);
+    snprintf(s->stream, sizeof s->stream, "%s/stream.shs", s->folder);
+    snprintf(s->file, sizeof s->file, "%s/points.%s", s->folder, as);
+    s->has_thread = pthread_create(&s->thread, NULL, make, s) == 0;
+    return s->has_thread ? SH_OK : sh_fail(err, SH_EIO, "no thread for a file");
+}
+
 /* The caller holds the lock. */
 static int begin(struct save *s, const char *as, struct sh_err *err)
 {
     if (s->state == SAVE_WORKING) return sh_fail(err, SH_EINPUT, "a file is being made (%s); ask again later", s->as);
     int rc = check_as(as, err);
-    if (rc == SH_OK) rc = make_folder(s, err);
     if (rc != SH_OK) return rc;
     save_join(s);
     empty_folder(s);
-    s->number++;
     s->gone = s->lost_frames = 0;
-    snprintf(s->as, sizeof s->as, "%s", as);
-    snprintf(s->stream, sizeof s->stream, "%s/stream.shs", s->folder);
-    snprintf(s->file, sizeof s->file, "%s/points.%s", s->folder, as);
-    s->has_thread = pthread_create(&s->thread, NULL, make, s) == 0;
-    s->state = s->has_thread ? SAVE_WORKING : SAVE_IDLE;
-    return s->has_thread ? SH_OK : sh_fail(err, SH_EIO, "no thread for a file");
+    rc = begin_thread(s, as, err);
+    s->state = rc == SH_OK ? SAVE_WORKING : SAVE_FAILED;
+    if (rc != SH_OK) s->failure = *err;
+    return rc;
 }
 
 int save_get(struct save *s, const char *query, struct web_body *out, struct sh_err *err)
@@ -245,11 +320,11 @@ int save_get_piece(struct save *s, const char *query, struct web_body *out, stru
 
 /* ---- life */
 
-struct save *save_create(struct past *past)
+struct save *save_create(const struct save_source *source)
 {
     struct save *s = calloc(1, sizeof *s);
     if (s == NULL) return NULL;
-    s->past = past;
+    s->source = *source;
     pthread_mutex_init(&s->lock, NULL);
     return s;
 }

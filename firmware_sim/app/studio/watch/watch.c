@@ -43,7 +43,7 @@ static int watch_make_room(struct watch *w, struct sh_err *err)
         if (config_serves(w->cfg, i)) report_head_of(w->site, i, &w->head[i]);
     const struct past_limits limits = {PAST_MOST_POINTS, PAST_MOST_BYTES};
     w->past = past_create(&limits);
-    w->save = w->past != NULL ? save_create(w->past) : NULL;
+    w->save = w->past != NULL ? save_create(&(struct save_source){w->past, watch_is_behind, w}) : NULL;
     if (w->head != NULL && w->shown_station != NULL && w->save != NULL) return SH_OK;
     return sh_fail(err, SH_ENOMEM, "no memory for %u stations", n);
 }
@@ -91,6 +91,8 @@ static int open_watch(const struct config *cfg, const struct site *site, const s
     w->source = (struct web_source){w, get, release};
     w->fd = w->link.fd = -1;
     atomic_init(&w->ending, 0);
+    atomic_init(&w->ended, 0);
+    atomic_init(&w->is_deaf, 0);
     pthread_mutex_init(&w->lock, NULL);
     int rc = watch_make_room(w, err);
     if (rc == SH_OK) rc = watch_make_scene(w, err);
