@@ -95,7 +95,8 @@ static const struct cfg_key config_keys[] = {
     {"head.phase_deg", SETTING(phase_udeg), CFG_MICRO, "deg", "0", 0, 359.999999,
      .help = "Azimuth of the rotor at a PPS pulse, with phase_lock: on."},
     {KEY(head.motor_ppm), CFG_REAL, "ppm", "0", -10000, 10000,
-     .help = "beams: how much too fast the rotor turns while nothing holds its phase."},
+     .help = "beams: how much too fast the rotor turns while nothing holds its phase. At lines_max_hz a turn must still "
+             "be as long as a firing sequence (firing_ns)."},
     {KEY(head.ambiguity), CFG_ENUM, .def = "none",
      WORDS([DETECT_AMBIGUITY_NONE] = "none", [DETECT_FOLDED] = "folded", [DETECT_RESOLVED] = "resolved"),
      .help = "Echoes from beyond c / (2 prr_hz), which return after the next pulse. none: they have their true range; "
