@@ -173,8 +173,8 @@ struct cast_counters {
     uint64_t decided;      /* struct bvh_counters */
     uint64_t few, asked;   /* with a sight: struct sight_counters */
     uint64_t unfit;        /* echoes whose position did not fit into 32 bits: shots without echo, or fewer echoes */
-    uint64_t faint;        /* hits below the detection threshold, in a blind time, or on a surface without echo: shots
-                          * without echo, or fewer echoes */
+    uint64_t faint;        /* hits that a head doesn't detect: shots without echo, or fewer echoes. They are below the
+                            * threshold, in a blind time, on a surface without echo, or at a range of 0 or less */
     uint64_t crowded;      /* echoes beyond max_echoes: the weakest, left out */
     uint64_t hidden;       /* pulses into the tripod's cone: shots without echo */
     uint64_t lost_samples; /* of waveforms, for which a block had no room */

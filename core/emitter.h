@@ -102,6 +102,8 @@ static inline uint32_t emitter_line_pulses(const struct emitter *emitter)
 }
 /* Returns the pulse rate of a head of beams in micro-hertz, rounded. */
 int64_t emitter_rate_uhz(const struct emitter *emitter);
+/* Returns the highest line rate of a head of beams in micro-hertz, rounded down: at it a turn has one sequence. */
+int64_t emitter_most_lines_uhz(const struct emitter *emitter);
 /* Returns the line angle of a planar head's step, rounded. The angle counts from the front, along the steps. */
 int64_t emitter_step_udeg(const struct emitter *emitter, int64_t step);
 

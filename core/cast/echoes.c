@@ -166,9 +166,31 @@ static double fixed_sigma_m(const struct cast_setup *s)
     return s->disturbance != NULL && !is_modelled ? s->range_sigma_m / s->disturbance->share : s->range_sigma_m;
 }
 
-/* Noise is keyed by scan, pulse and echo, so that it doesn't depend on which other echoes are sent. */
-static void add_noise(struct caster *c, const struct cast_setup *s)
+static void lose_low_echo(struct caster *c, uint32_t i, double limit_m)
 {
+    if (!(c->list.range_m[i] <= limit_m)) return;
+    c->list.range_m[i] = (double)NAN;
+    c->counters.faint++;
+}
+
+/* No head measures a range of 0 or less, or one that rounds to 0 in the counts of polar. Noise and range errors of the
+ * instrument may make one of a near hit. Such an echo is lost. */
+static void lose_low(struct caster *c, const struct chunk *k)
+{
+    const double limit_m = k->s->layout == LINE_GEO ? 0.0 : 0.5 * k->s->range_scale_m;
+    struct echo_list *l = &c->list;
+    if (!kernel_has_low(l->range_m, limit_m, l->n)) return;
+    for (uint32_t i = 0; i < k->n; i++)
+        lose_low_echo(c, i, limit_m);
+    for (uint32_t g = 0; g < l->n_secondary; g++)
+        for (uint32_t j = 0; j < l->secondary[g].n; j++)
+            lose_low_echo(c, l->secondary[g].at + j, limit_m);
+}
+
+/* Noise is keyed by scan, pulse and echo, so that it doesn't depend on which other echoes are sent. */
+static void add_noise(struct caster *c, const struct chunk *k)
+{
+    const struct cast_setup *s = k->s;
     const struct cast_detect *d = s->detect;
     struct echo_list *l = &c->list;
     const struct detect_echoes echoes = {
@@ -179,6 +201,7 @@ static void add_noise(struct caster *c, const struct cast_setup *s)
         detect_fixed_noise(fixed_sigma_m(s), 1e-6 * s->range_sigma_ppm, s->noise_key ^ s->scan_key, l->n, l->key,
                            l->range_m);
     if (d != NULL && d->instrument != NULL) instrument_range(d->instrument, l->n, l->range_m);
+    if (s->noise_on || (d != NULL && (d->noise_by_signal || d->instrument != NULL))) lose_low(c, k);
 }
 
 static void make_keys(struct echo_list *l, const struct chunk *k)
@@ -317,7 +340,7 @@ void caster_report(struct caster *c, const struct chunk *k)
     if (s->detect != NULL || s->noise_on) make_keys(l, k);
     if (s->detect != NULL) detect(c, k);
     bvh_stage_ends(c->profile, CAST_DETECT);
-    if (!finds_echoes(k)) add_noise(c, s);
+    if (!finds_echoes(k)) add_noise(c, k);
     bvh_stage_ends(c->profile, CAST_NOISE);
     if (l->n_secondary > 0) choose_echoes(c, k);
 }

@@ -16,6 +16,15 @@ void kernel_limit(double *restrict range_m, double min_m, double max_m, uint32_t
 }
 
 VEC_CLONES
+int kernel_has_low(const double *restrict range_m, double limit_m, uint32_t n)
+{
+    uint64_t low = 0;
+    for (uint32_t i = 0; i < n; i++)
+        low += range_m[i] <= limit_m; /* not for NaN */
+    return low != 0;
+}
+
+VEC_CLONES
 void kernel_keys(uint64_t pulse0, const uint8_t *restrict number, uint32_t n, uint64_t *restrict key)
 {
     for (uint32_t i = 0; i < n; i++)

@@ -9,6 +9,8 @@ struct kernel_turns;
 
 /* Sets ranges outside of the head's limits to NaN. */
 void kernel_limit(double *range_m, double min_m, double max_m, uint32_t n);
+/* Returns whether a range is at or below a limit. */
+int kernel_has_low(const double *range_m, double limit_m, uint32_t n);
 /* Sets the keys of the echoes' random numbers: rng_echo. */
 void kernel_keys(uint64_t pulse0, const uint8_t *number, uint32_t n, uint64_t *key);
 

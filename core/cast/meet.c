@@ -48,7 +48,8 @@ static int is_reported(const struct meeting *m, const struct seen *seen)
     if (d->signal != NULL && !(detect_amplitude(d->signal, range_m, rho) >= 1.0)) return 0;
     if (d->ambiguity != DETECT_AMBIGUITY_NONE)
         detect_zones(d->ambiguity, m->period_s, d->zones, m->s->range_min_m, 1, &range_m);
-    return !isnan(range_m);
+    if (d->instrument != NULL) instrument_range(d->instrument, 1, &range_m);
+    return range_m > 0.0; /* not for NaN */
 }
 
 /* Glass does not refract: hits beyond it are on the same line. */

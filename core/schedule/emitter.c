@@ -124,6 +124,11 @@ int64_t emitter_rate_uhz(const struct emitter *e)
     return (int64_t)(1e6 * e->n_beams / sequence_s + 0.5);
 }
 
+int64_t emitter_most_lines_uhz(const struct emitter *e)
+{
+    return (int64_t)((u128)e->tick_den * NS_TIMES_UHZ / ((u128)e->tick_num * e->sequence_ticks));
+}
+
 int64_t emitter_step_udeg(const struct emitter *e, int64_t step)
 {
     const int64_t turned = (step - e->front_step) * TURN_UDEG, half = e->steps / 2;

@@ -3,7 +3,6 @@
 
 #include <string.h>
 
-static const uint64_t NS_TIMES_UHZ = 1000000000000000; /* ns per second x micro-hertz per hertz */
 static const uint64_t FINE_DEN = 1ull << 40;
 
 /* Returns how many lines the pan needs for span_fine (2^-24 micro-degrees), at least one. The sweep of the first

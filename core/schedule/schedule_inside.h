@@ -13,7 +13,8 @@
 
 __extension__ typedef unsigned __int128 u128;
 
-#define TURN_UDEG 360000000LL
+#define TURN_UDEG    360000000LL
+#define NS_TIMES_UHZ 1000000000000000ull /* ns per second x micro-hertz per hertz */
 
 static inline u128 gcd(u128 a, u128 b)
 {

@@ -87,7 +87,7 @@ static void set_beams(struct cfg_reader *rd, struct config_profile *p)
     else if (emitter_set_beams(&p->emitter, beam, c->n_beams, (uint64_t)(c->firing_fs / FS_PER_PS),
                                c->step_direction == TURN_CLOCKWISE ? 1 : -1, &why) != SH_OK)
         cfg_fail_key(rd, "beams", "%s", why.text);
-    else if (firing_ns * lines_max_hz > 1e9)
+    else if (p->lines_max_uhz > emitter_most_lines_uhz(&p->emitter))
         cfg_fail_key(rd, "firing_ns", "%.15g ns is longer than a turn at lines_max_hz; allowed up to %.15g ns",
                      firing_ns, 1e9 / lines_max_hz);
     else if (1e9 * c->n_beams / firing_ns > PRR_MOST_HZ)
@@ -221,6 +221,20 @@ static void refuse_rotor_settings(struct cfg_reader *rd, const struct config *cf
         refuse_key_of_other(rd, cfg, of_rotor[i], "", "only with emitter: beams");
 }
 
+/* The rotor may be set to any line rate up to the profile's, and motor_ppm comes on top. A turn still needs a whole
+ * firing sequence. */
+static void check_motor(struct cfg_reader *rd, const struct config *cfg)
+{
+    const int64_t max_uhz = cfg->profile.lines_max_uhz, most_uhz = emitter_most_lines_uhz(&cfg->profile.emitter);
+    if (!CFG_SOUND(rd, "head.motor_ppm") || max_uhz + config_motor_uhz(cfg->head.motor_ppm, max_uhz) <= most_uhz)
+        return;
+    cfg_fail_key(rd, "head.motor_ppm",
+                 "%.10g makes a turn at %.15g lines per second shorter than the firing sequence of head profile %s; "
+                 "allowed up to %.10g",
+                 cfg->head.motor_ppm, from_micro(max_uhz), cfg->profile.name,
+                 floor(1e6 * (1e6 * (double)(most_uhz - max_uhz) / (double)max_uhz)) / 1e6);
+}
+
 void cfg_check_emitter_settings(struct cfg_reader *rd, struct config *cfg)
 {
     struct head_settings *s = &cfg->head.settings;
@@ -236,6 +250,7 @@ void cfg_check_emitter_settings(struct cfg_reader *rd, struct config *cfg)
                      "turns per second",
                      from_micro(s->lines_uhz));
     check_instrument(rd, cfg);
+    if (cfg_has_profile(rd) && kind == EMITTER_BEAMS) check_motor(rd, cfg);
     if (kind == EMITTER_BEAMS && cfg->head.ambiguity != DETECT_AMBIGUITY_NONE)
         cfg_fail_key(rd, "head.ambiguity", "the pulses of head profile %s are not evenly spaced in time; allowed none",
                      cfg->profile.name);

@@ -32,8 +32,9 @@ static void check_factor(struct cfg_reader *rd, const struct config *cfg, const 
     const double most_hz = from_micro(cfg->profile.lines_max_uhz);
     if (f->factor > 1.0 && f->factor * lines_hz > most_hz)
         cfg_fail_item(rd, "faults[].factor", i,
-                      "%.10g times %.10g lines per second are more than head profile %s can have; allowed up to %.10g",
-                      f->factor, lines_hz, cfg->profile.name, most_hz / lines_hz);
+                      "%.10g times %.10g lines per second are more than head profile %s can have; allowed %s %.10g",
+                      f->factor, lines_hz, cfg->profile.name, most_hz > lines_hz ? "up to" : "below",
+                      most_hz / lines_hz);
 }
 
 /* A soiled window shows only in amplitudes, in noise that grows as the signal fades, or in LCMstate of cola. Windows

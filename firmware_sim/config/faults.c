@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Injected faults: checks of their keys against each other, the links and the head; scenarios, and faults that commands
  * add. (Diagnostics of a configuration are in table/diagnostics.c.) */
+#include <math.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -153,6 +155,38 @@ static void check_values(struct cfg_reader *rd, const struct fault *f, uint32_t 
                       (unsigned long long)f->from_pulse);
 }
 
+/* Values with which a fault would change nothing. Times of the clock are whole nanoseconds, so less than half of one is
+ * nothing, too. */
+static const struct {
+    enum fault_kind kind;
+    const char *path;
+    size_t offset; /* in struct fault */
+    double none, within;
+} idle[] = {
+    {FAULT_MIRROR_SLOW, "faults[].factor", offsetof(struct fault, factor), 1.0, 0.0},
+    {FAULT_MIRROR_WOBBLE, "faults[].deg", offsetof(struct fault, deg), 0.0, 0.0},
+    {FAULT_PAN_SLIP, "faults[].deg", offsetof(struct fault, deg), 0.0, 0.0},
+    {FAULT_WINDOW_SOILED, "faults[].loss_db", offsetof(struct fault, loss_db), 0.0, 0.0},
+    {FAULT_CLOCK_JUMP, "faults[].jump_s", offsetof(struct fault, jump_s), 0.0, 4.9e-10},
+    {FAULT_NTP_STEP, "faults[].jump_s", offsetof(struct fault, jump_s), 0.0, 4.9e-10},
+    {FAULT_CLOCK_DRIFT, "faults[].ppm", offsetof(struct fault, ppm), 0.0, 0.0},
+    {FAULT_PTP_STEP, "faults[].ns", offsetof(struct fault, ns), 0.0, 0.49},
+    {FAULT_PTP_ASYMMETRY, "faults[].ns", offsetof(struct fault, ns), 0.0, 0.49},
+    {FAULT_PTP_JITTER, "faults[].ns", offsetof(struct fault, ns), 0.0, 0.49},
+};
+
+static void check_effect(struct cfg_reader *rd, const struct fault *f, uint32_t i)
+{
+    for (size_t k = 0; k < CFG_LEN(idle); k++) {
+        double is;
+        if (idle[k].kind != f->kind || !CFG_ITEM_SOUND(rd, i, idle[k].path)) continue;
+        memcpy(&is, (const char *)f + idle[k].offset, sizeof is);
+        if (fabs(is - idle[k].none) <= idle[k].within)
+            cfg_fail_item(rd, idle[k].path, i, "%s would have no effect with %.10g; allowed are other values",
+                          fault_names[f->kind], is);
+    }
+}
+
 void cfg_check_faults(struct cfg_reader *rd, struct fault_list *list)
 {
     for (uint32_t i = 0; i < list->n; i++) {
@@ -162,6 +196,7 @@ void cfg_check_faults(struct cfg_reader *rd, struct fault_list *list)
         if (!CFG_ITEM_SOUND(rd, i, "faults[].kind")) continue;
         check_keys(rd, f, i);
         check_values(rd, f, i);
+        check_effect(rd, f, i);
     }
 }
 

@@ -84,7 +84,9 @@ static const struct cfg_key config_keys[] = {
      .allowed = "range_min_m to range_max_m of the head profile, in m",
      .help = "Pulses that hit something farther are shots without echo. The descriptor on the wire has these limits."},
     {"head.frames", SETTING(frames), CFG_COUNT, NULL, "1", 0, HEAD_MAX_FRAMES,
-     .help = "Frames (pan sweeps, or turns of a head without a pan) per scan; 0: until stopped."},
+     .help = "Frames (pan sweeps, or turns of a head without a pan) per scan; 0: until stopped. With a link of "
+             "protocol scip, cola, velodyne or velodyne-http, `scanhead run` scans until stopped where this key is "
+             "not given."},
     {"head.station", SETTING(station), CFG_COUNT, NULL, "1", 1, CONFIG_MAX_STOPS,
      .help = "Station where the head stands, counted from 1."},
 
@@ -95,7 +97,8 @@ static const struct cfg_key config_keys[] = {
     {"head.phase_deg", SETTING(phase_udeg), CFG_MICRO, "deg", "0", 0, 359.999999,
      .help = "Azimuth of the rotor at a PPS pulse, with phase_lock: on."},
     {KEY(head.motor_ppm), CFG_REAL, "ppm", "0", -10000, 10000,
-     .help = "beams: how much too fast the rotor turns while nothing holds its phase."},
+     .help = "beams: how much too fast the rotor turns while nothing holds its phase. At lines_max_hz a turn must "
+             "still be as long as a firing sequence (firing_ns)."},
     {KEY(head.ambiguity), CFG_ENUM, .def = "none",
      WORDS([DETECT_AMBIGUITY_NONE] = "none", [DETECT_FOLDED] = "folded", [DETECT_RESOLVED] = "resolved"),
      .help = "Echoes from beyond c / (2 prr_hz), which return after the next pulse. none: they have their true range; "

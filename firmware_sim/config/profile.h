@@ -4,6 +4,8 @@
 #ifndef FIRMWARE_SIM_CONFIG_PROFILE_H
 #define FIRMWARE_SIM_CONFIG_PROFILE_H
 
+#include <math.h>
+
 #include "core/detect.h"
 #include "core/footprint.h"
 #include "core/schedule.h"
@@ -11,6 +13,12 @@
 #include "firmware_sim/config/limits.h"
 
 struct sh_err;
+
+/* Returns by how much the error of a rotor's motor makes a line rate higher, rounded to micro-hertz. */
+static inline int64_t config_motor_uhz(double motor_ppm, int64_t lines_uhz)
+{
+    return llround(1e-6 * motor_ppm * (double)lines_uhz);
+}
 
 /* How sure a figure of a profile is; config/heads/README.md says what each word means. */
 enum config_from { FROM_DATA_SHEET, FROM_QUOTED, FROM_ASSUMED };

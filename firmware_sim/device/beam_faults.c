@@ -104,17 +104,13 @@ static void slow_down(const struct device_beam *beam, const struct site *site, s
         spec->lines_uhz = spec->prr_uhz;
 }
 
-static int64_t free_uhz(const struct device_beam *beam, int64_t lines_uhz)
-{
-    return beam->free_ppm != 0.0 ? llround(1e-6 * beam->free_ppm * (double)lines_uhz) : 0;
-}
-
 void device_fill_spec(struct device_beam *beam, const struct site *site, struct schedule_spec *spec)
 {
     site_fill_spec(site, &beam->scan->settings, spec);
     beam->scan->prr_uhz = spec->prr_uhz;
     beam->scan->lines_uhz = spec->lines_uhz;
-    spec->lines_uhz = beam->held_uhz != 0 ? beam->held_uhz : spec->lines_uhz + free_uhz(beam, spec->lines_uhz);
+    spec->lines_uhz =
+        beam->held_uhz != 0 ? beam->held_uhz : spec->lines_uhz + config_motor_uhz(beam->free_ppm, spec->lines_uhz);
     slow_down(beam, site, spec);
 }
 

@@ -109,7 +109,7 @@ struct device {
     struct device_machine machine;
     struct device_power power;
     struct device_scan scan;
-    uint32_t *station_scans; /* [n_stations] in the whole run, power cycles included */
+    uint32_t *station_scans; /* [n_stations] since power-up */
     struct device_events events;
     struct device_overrun overrun;
     struct device_live live;

@@ -7,13 +7,20 @@
  *
  * Speeds are whole micro-hertz, so an error of half of one is left after a second: 0.00018 degree. The wire has steps
  * of 0.01. The rotor turns at most half a turn more or less in that second. Where more would exceed its highest speed,
- * it turns up to one turn less. So one second is enough for any phase. */
+ * it turns up to one turn less. So one second is enough for any phase.
+ *
+ *     after a pulse   the old speed lasts until the scan's next pulse: a tick or two. A rotor that was slower by up to
+ *                     a turn a second loses that part of a turn again. It then turns faster than its highest speed by
+ *                     that little: it must not lose a whole turn for it in each second.
+ *     slow rotors     no speed is below half of the one that is set. Below 2 turns a second a phase may need more
+ *                     than one second. */
 #include <math.h>
 
 #include "firmware_sim/config/profile.h"
 #include "firmware_sim/device/device_state.h"
 
 static const double TURN_UDEG = 360e6, SECOND_NS = 1e9;
+static const double ROUNDED_TURN = 1e-6; /* half a micro-hertz for a second, and the rounding of times */
 static const int64_t HERTZ_UHZ = 1000000, HELD_UDEG = 10000 /* a step of the wire */;
 
 /* Turns in -1/2..1/2. */
@@ -52,18 +59,30 @@ static void note_edge(struct device *device, double turn)
                      fabs(wrap(turn - (double)phase_udeg / TURN_UDEG)) * TURN_UDEG <= (double)HELD_UDEG;
 }
 
+/* Returns the speed that makes up for the missing turns in left_s. A missing part of up to spare_turn is no reason to
+ * lose a turn. */
+static int64_t find_speed(const struct device *device, double missing, double left_s, double spare_turn)
+{
+    const struct config_profile *profile = site_profile(device->site);
+    const double set_uhz = (double)device->scan.lines_uhz, max_uhz = (double)profile->lines_max_uhz;
+    if (left_s <= 0.0) return device->scan.lines_uhz;
+    if (missing > spare_turn && set_uhz + 1e6 * missing / left_s > max_uhz) missing -= 1.0;
+    const double uhz = set_uhz + 1e6 * missing / left_s,
+                 most_uhz = fmin(uhz, (double)emitter_most_lines_uhz(&profile->emitter));
+    return llround(fmax(most_uhz, 0.5 * set_uhz));
+}
+
 /* Chooses the speed with which the azimuth is right a second after the edge. The speed holds from the scan's next pulse
  * on, the first one after the edge. */
 static void hold(struct device *device, int64_t edge_ns)
 {
     const struct device_scan *scan = &device->scan;
     const struct schedule_segment *seg = &scan->segment;
-    const int64_t most_uhz = site_profile(device->site)->lines_max_uhz;
     const double left_s = 1.0 + (double)(edge_ns - schedule_time_ns(seg, scan->pulse_next)) / SECOND_NS;
     const double free_turn = schedule_sweep_turn(seg, scan->pulse_next) + 1e-6 * (double)scan->lines_uhz * left_s;
-    double missing = wrap((double)device->scan.settings.phase_udeg / TURN_UDEG - free_turn);
-    if (missing > 0.0 && scan->lines_uhz + llround(1e6 * missing / left_s) > most_uhz) missing -= 1.0;
-    set_speed(device, scan->lines_uhz + llround(1e6 * missing / left_s));
+    const double missing = wrap((double)device->scan.settings.phase_udeg / TURN_UDEG - free_turn);
+    /* A second with a whole turn less is slower by 1 / left_s, a little more than a turn a second. */
+    set_speed(device, find_speed(device, missing, left_s, 2.0 * (1.0 - left_s) + ROUNDED_TURN));
 }
 
 static int is_locked(const struct device *device, int64_t t_ns)

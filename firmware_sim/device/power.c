@@ -62,6 +62,7 @@ static void turn_on(struct device *device, uint64_t tick)
     cmd->control = 0;
     cmd->frames_done = 0;
     memset(&cmd->queue, 0, sizeof cmd->queue);
+    memset(device->station_scans, 0, device->site->n_stations * sizeof *device->station_scans);
     set_near_wrap(device, tick);
     device_start_date(device, time_of(device, tick));
     device->power.again++;

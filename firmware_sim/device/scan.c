@@ -65,7 +65,9 @@ uint32_t device_tick_pulses(const struct config *cfg)
 
 uint32_t device_tick_lines(const struct config *cfg)
 {
-    return (uint32_t)ceil((double)cfg->profile.lines_max_uhz * 1e-6 / cfg->loop.tick_hz) + 2;
+    const int64_t most_uhz = cfg->profile.lines_max_uhz;
+    const double most_hz = 1e-6 * (double)(most_uhz + config_motor_uhz(fmax(cfg->head.motor_ppm, 0.0), most_uhz));
+    return (uint32_t)ceil(most_hz / cfg->loop.tick_hz) + 2;
 }
 
 /* Returns the first pulse that has no room in this tick. When the rates rise suddenly, more pulses may be due than one

@@ -14,9 +14,11 @@ int worker_add_ahead(struct worker *worker, struct sh_err *err)
     return caster_add_ahead(worker->caster, PULSES, err);
 }
 
+/* Returns the pulses of a line, rounded down, but at least one. */
 static uint64_t line_pulses(const struct schedule_segment *segment)
 {
-    return segment->den / segment->num;
+    const uint64_t n = segment->den / segment->num;
+    return n > 1 ? n : 1;
 }
 
 uint64_t worker_end_ahead(struct worker *worker, const struct device_work *work)

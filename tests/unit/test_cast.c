@@ -342,6 +342,50 @@ static void noise_has_its_sigma(void **state)
     cast_rig_close(rig);
 }
 
+/* The instrument reads 2 m too little, or the noise is as large as the room. Hits that are then at or behind the head
+ * have no echo in either layout, and count as not detected. Counts are 10 um. */
+static void no_range_is_below_zero(void **state)
+{
+    (void)state;
+    static uint32_t exact[RIG_LINE];
+    static struct cast_hit hit[RIG_LINE];
+    static const struct instrument near_by_2 = {.range_offset_m = -2.0};
+    struct cast_detect detect = {.max_echoes = 1, .instrument = &near_by_2};
+    struct cast_rig *rig = room();
+    struct schedule_line line;
+    struct cast_counters before, after;
+    for (int i = 0; i < 4; i++) {
+        const int noisy = i >= 2;
+        uint32_t echoes = 0, n;
+        rig->setup.layout = LINE_POLAR;
+        rig->setup.noise_on = 0;
+        rig->setup.detect = NULL;
+        n = cast_line(rig, 40, &line);
+        memcpy(exact, rig->block.a, n * sizeof *exact);
+        rig->setup.layout = i % 2 == 0 ? LINE_POLAR : LINE_GEO;
+        rig->setup.detect = noisy ? NULL : &detect;
+        rig->setup.noise_on = noisy;
+        rig->setup.range_sigma_m = 5.0;
+        caster_get_counters(rig->caster, &before);
+        cast_line(rig, 40, &line);
+        caster_get_counters(rig->caster, &after);
+        for (uint32_t k = 0; k < n; k++) {
+            const int has_echo = rig->block.echo[k] != 0;
+            echoes += (uint32_t)has_echo;
+            if (!noisy) assert_int_equal(has_echo, exact[k] > 200000);
+            if (rig->setup.layout == LINE_POLAR) assert_int_equal(has_echo, rig->block.a[k] != 0);
+            if (!noisy && i == 0 && has_echo) assert_in_range(exact[k] - rig->block.a[k], 199999, 200001);
+        }
+        assert_true(echoes > 100 && n - echoes > 100);
+        assert_int_equal(after.faint - before.faint, n - echoes);
+        if (noisy) continue;
+        struct schedule_run run;
+        schedule_get_run(&rig->segment, &line, line.cast0, n, &run);
+        assert_int_equal(caster_meet(rig->caster, &rig->setup, &run, hit), echoes);
+    }
+    cast_rig_close(rig);
+}
+
 static struct scene *tetrahedron(const double vertex[4][3])
 {
     static const uint32_t triangle[4][3] = {{0, 1, 2}, {0, 2, 3}, {0, 3, 1}, {1, 3, 2}};
@@ -413,6 +457,7 @@ int main(void)
         cmocka_unit_test(limits_are_allowed_ranges),
         cmocka_unit_test(limits_block_or_swallow_the_echo),
         cmocka_unit_test(noise_has_its_sigma),
+        cmocka_unit_test(no_range_is_below_zero),
     };
     return cmocka_run_group_tests_name("cast", tests, NULL, NULL);
 }

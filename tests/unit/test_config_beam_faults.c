@@ -34,7 +34,9 @@ static void a_head_has_faults_of_what_it_has(void **state)
         {NULL, "", "{kind: mirror_stuck}, {kind: mirror_wobble}, {kind: pan_slip}, {kind: laser_off}", NULL},
         {"hokuyo-utm-30lx", "", "{kind: mirror_slow, factor: 2}",
          ": faults[0].factor: 2 times 40 lines per second are more than head profile hokuyo-utm-30lx can have; "
-         "allowed up to 1"},
+         "allowed below 1"},
+        {"hokuyo-ust-10lx", "", "{kind: mirror_slow, factor: 1}",
+         ": faults[0].factor: mirror_slow would have no effect with 1; allowed are other values"},
         {NULL, "", "{kind: window_soiled}", NO_EFFECT},
         {NULL, "noise: {range: on, sigma_m: 0}\n", "{kind: window_soiled}", NO_EFFECT},
         {NULL, "noise: {range: on}\n", "{kind: window_soiled}", NULL},

@@ -236,8 +236,8 @@ static void injected_faults(void **state)
         /* 200 lines/s: 1.2 times that is 240, the most */
         {"any-rate", "  lines_hz: 200\n", FAULT "mirror_slow, factor: 1.2}]\n", FAULT "mirror_slow, factor: 1.2001}]\n",
          "faults[0].factor"},
-        {"any-rate", "  lines_hz: 240\n", FAULT "mirror_slow, factor: 1}]\n", FAULT "mirror_slow, factor: 1.0001}]\n",
-         "faults[0].factor"},
+        {"any-rate", "  lines_hz: 240\n", FAULT "mirror_slow, factor: 0.9999}]\n",
+         FAULT "mirror_slow, factor: 1.0001}]\n", "faults[0].factor"},
         {ANY, "noise: {range: on}\n" FAULT "window_soiled}]\n", FAULT "window_soiled}]\n", "faults[0].kind"},
         {ANY, "noise: {range: on, sigma_m: 1e-9}\n" FAULT "window_soiled}]\n",
          "noise: {range: on, sigma_m: 0}\n" FAULT "window_soiled}]\n", "faults[0].kind"},

@@ -207,6 +207,39 @@ static void kinds_need_what_they_change(void **state)
     }
 }
 
+/* Of each key the value that changes nothing, and the nearest ones that change something. The state of a port that
+ * loses its master changes whatever its clock gains, so 0 ppm is no such value there. */
+static void a_fault_has_an_effect(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *kind, *key, *none, *some[2];
+    } rows[] = {
+        {"mirror_slow", "factor", "1", {"0.99", "1.01"}}, {"mirror_wobble", "deg", "0", {"-0.001", "1"}},
+        {"pan_slip", "deg", "0", {"-0.001", "1"}},        {"window_soiled", "loss_db", "0", {"0.001", "60"}},
+        {"clock_jump", "jump_s", "0", {"-1e-9", "1e-9"}}, {"clock_jump", "jump_s", "4e-10", {"-1e-9", "1e-9"}},
+        {"clock_drift", "ppm", "0", {"-0.001", "1"}},     {"ptp_step", "ns", "0", {"-1", "1"}},
+        {"ptp_asymmetry", "ns", "-0.4", {"-1", "1"}},     {"ptp_jitter", "ns", "0", {"0.5", "1"}},
+        {"ntp_step", "jump_s", "0", {"-1e-9", "1"}},      {"ptp_lost", "ppm", "", {"0", "0"}},
+        {"ptp_no_sync", "ppm", "", {"0", "0"}},           {"ptp_faulty", "ppm", "", {"0", "0"}},
+        {"ptp_grandmaster", "ns", "", {"0", "0"}},
+    };
+    load_base();
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        struct kind kind = {.name = rows[i].kind};
+        char rest[64], want[160];
+        for (int v = 0; v < 3; v++) {
+            const char *value = v == 0 ? rows[i].none : rows[i].some[v - 1];
+            if (value[0] == '\0') continue;
+            snprintf(rest, sizeof rest, ", %s: %s", rows[i].key, value);
+            snprintf(want, sizeof want, "faults[1].%s: %s would have no effect with %s; allowed are other values",
+                     rows[i].key, rows[i].kind, value);
+            read_kind(&kind, rest);
+            if (is_said(want) != (v == 0)) fail_msg("%s%s: %s", rows[i].kind, rest, err.text);
+        }
+    }
+}
+
 /* Kinds that a link can have; others are not of links. A terminal can't fall silent: there `cable` does what `unplug`
  * does. */
 static void links_have_the_faults_that_they_can(void **state)
@@ -237,9 +270,13 @@ static void links_have_the_faults_that_they_can(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(kinds_have_places_and_numbers), cmocka_unit_test(kinds_have_their_keys),
-        cmocka_unit_test(what_is_not_given_is_as_said),  cmocka_unit_test(numbers_and_times_have_limits),
-        cmocka_unit_test(kinds_need_what_they_change),   cmocka_unit_test(links_have_the_faults_that_they_can),
+        cmocka_unit_test(kinds_have_places_and_numbers),
+        cmocka_unit_test(kinds_have_their_keys),
+        cmocka_unit_test(a_fault_has_an_effect),
+        cmocka_unit_test(what_is_not_given_is_as_said),
+        cmocka_unit_test(numbers_and_times_have_limits),
+        cmocka_unit_test(kinds_need_what_they_change),
+        cmocka_unit_test(links_have_the_faults_that_they_can),
     };
     return cmocka_run_group_tests_name("kinds of faults in the configuration", tests, set_up, tear_down);
 }

@@ -103,6 +103,38 @@ static void so_many_beams_fire_so_often(void **state)
     }
 }
 
+/* 40 ms are a turn of 25 Hz, and 20 Hz are the most: the rotor may turn a quarter too fast, more than any motor_ppm.
+ * 49,999,900 ns are a turn of 20.00004 Hz: 2 ppm. */
+static void a_turn_has_a_firing_sequence(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *firing_ns, *ppm, *allowed; /* NULL: it is taken */
+    } rows[] = {{"40000000", "10000", NULL}, {"50000000", "1", "0"},   {"50000000", "0", NULL},
+                {"50000000", "-5", NULL},    {"49999900", "2.1", "2"}, {"49999900", "2", NULL}};
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        char text[8448], settings[64], says[256];
+        char *whole = read_source("config/heads/velodyne-vlp16.yaml");
+        snprintf(
+            text, sizeof text,
+            "%.*sfiring_ns: {value: %s, from: assumed}\nbeams: [{elevation_deg: 0, offset_ns: 0, from: assumed}]\n%s",
+            (int)(strstr(whole, "firing_ns:") - whole), whole, rows[i].firing_ns, strstr(whole, "lines_min_hz:"));
+        write_in("heads/mine.yaml", text);
+        free(whole);
+        snprintf(settings, sizeof settings, "  motor_ppm: %s\n", rows[i].ppm);
+        const int code = load_with_head("mine", settings, "");
+        if (rows[i].allowed == NULL) {
+            assert_loads(code);
+            continue;
+        }
+        snprintf(says, sizeof says,
+                 ":3: head.motor_ppm: %s makes a turn at 20 lines per second shorter than the firing sequence of head "
+                 "profile mine; allowed up to %s",
+                 rows[i].ppm, rows[i].allowed);
+        assert_says(says);
+    }
+}
+
 /* Velodyne's packets have 16 beams. */
 static void a_protocol_has_its_beams(void **state)
 {
@@ -291,9 +323,9 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(profiles_are_refused_word_by_word), cmocka_unit_test(so_many_beams_fire_so_often),
-        cmocka_unit_test(a_protocol_has_its_beams),          cmocka_unit_test(the_file_names_the_profile),
-        cmocka_unit_test(the_longest_path_of_a_profile),     cmocka_unit_test(values_are_shown_safe_and_short),
-        cmocka_unit_test(sets_are_refused_word_by_word),
+        cmocka_unit_test(a_turn_has_a_firing_sequence),      cmocka_unit_test(a_protocol_has_its_beams),
+        cmocka_unit_test(the_file_names_the_profile),        cmocka_unit_test(the_longest_path_of_a_profile),
+        cmocka_unit_test(values_are_shown_safe_and_short),   cmocka_unit_test(sets_are_refused_word_by_word),
     };
     return cmocka_run_group_tests_name("messages of head profiles", tests, set_up, tear_down);
 }

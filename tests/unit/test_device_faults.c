@@ -360,7 +360,7 @@ static void reboots_by_command(void **state)
         if (!replays) rig_tell(rig, "HEAD:PRR 100000", 300);
         if (!replays) rig_tell(rig, "SCAN:START", 300);
         rig_go_to(rig, 500);
-        assert_true(rig->work.scanning);
+        assert_true(rig->work.scanning && rig->work.scan == 1 && rig->work.station_scan == 1);
         if (!replays) assert_string_equal(rig_tell(rig, "HEAD:REBOOT", 495), "OK");
         assert_true(rig_claim(rig));
         assert_true(rig->work.power == DEVICE_POWER_GOES && rig->work.tick == 500 && !rig->work.scanning);
@@ -370,6 +370,10 @@ static void reboots_by_command(void **state)
         assert_int_equal(next_state(rig, "idle"), 501 + BOOT_TICKS);
         assert_string_equal(rig_tell(rig, "HEAD:PRR?", rig->next), "300000");
         assert_string_equal(rig_tell(rig, "SYST:CONT?", rig->next), "0");
+        /* The scan's number goes on. Its noise is that of the station's first scan since power-up. */
+        if (!replays) rig_tell(rig, "SCAN:START", rig->next);
+        rig_go_to(rig, rig->next + 200);
+        assert_true(rig->work.scanning && rig->work.scan == 2 && rig->work.station_scan == 1);
         rig_close(rig);
     }
     struct rig *rig = open_with("  - {kind: self_test, until_s: 0.3}\n", NULL, NULL, 0);

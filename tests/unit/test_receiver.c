@@ -214,11 +214,13 @@ static void the_rotor_is_where_the_lock_wants_it(void **state)
     static const struct {
         const char *lines, *phase, *epoch;
         double deg, edge_s;
-    } cases[] = {{"head.lines_hz=5", "head.phase_deg=0", "time.epoch=2026-01-01T00:59:57.5Z", 0, 0.5},
-                 /* The last pulses of the tick with the edge come before it. */
-                 {"head.lines_hz=10", "head.phase_deg=90.01", "time.epoch=2026-01-01T00:59:57.49902Z", 90.01, 0.50098},
-                 {"head.lines_hz=20", "head.phase_deg=359.99", "time.epoch=2026-01-01T00:59:57.5Z", 359.99, 0.5},
-                 {"head.lines_hz=20", "head.phase_deg=180", "time.epoch=2026-01-01T00:59:57.5Z", 180, 0.5}};
+        int turns;
+    } cases[] = {
+        {"head.lines_hz=5", "head.phase_deg=0", "time.epoch=2026-01-01T00:59:57.5Z", 0, 0.5, 5},
+        /* The last pulses of the tick with the edge come before it. */
+        {"head.lines_hz=10", "head.phase_deg=90.01", "time.epoch=2026-01-01T00:59:57.49902Z", 90.01, 0.50098, 10},
+        {"head.lines_hz=20", "head.phase_deg=359.99", "time.epoch=2026-01-01T00:59:57.5Z", 359.99, 0.5, 20},
+        {"head.lines_hz=20", "head.phase_deg=180", "time.epoch=2026-01-01T00:59:57.5Z", 180, 0.5, 20}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         const char *sets[] = {cases[i].lines, cases[i].phase, cases[i].epoch, "head.phase_lock=on",
                               "head.motor_ppm=-300"};
@@ -229,9 +231,68 @@ static void the_rotor_is_where_the_lock_wants_it(void **state)
             const double beyond_deg = beyond(turn_at(rig, s + cases[i].edge_s), cases[i].deg);
             if (fabs(beyond_deg) > EXACT_DEG)
                 fail_msg("%s: at second %d it is %.6f degrees beyond", cases[i].lines, s, beyond_deg);
-            assert_true(rig->work.segment.spec.lines_uhz <= 20000000); /* a head has no more turns than its profile */
+            if (s == 3) continue;
+            /* The speed of the second before lasts for two ticks at most, and was wrong by up to a turn a second. */
+            const int64_t uhz = rig->work.segment.spec.lines_uhz, set_uhz = 1000000 * cases[i].turns;
+            if (llabs(uhz - set_uhz) > 2000)
+                fail_msg("%s: at second %d it turns %lld uHz", cases[i].lines, s, (long long)uhz);
         }
         assert_memory_equal(rig_tell(rig, "HEAD:PHAS:EDGE?", rig->next), "LOCKED,", 7);
+        rig_close(rig);
+    }
+}
+
+/* A head of one beam with one speed, and a file in the folder. */
+static void write_beam(int lines_hz, const char *firing_ns)
+{
+    char path[96];
+    snprintf(path, sizeof path, "%s/head.yaml", folder);
+    FILE *f = fopen(path, "w");
+    assert_non_null(f);
+    fprintf(f, "maker: none\nmodel: beam\nfirmware: 1\nemitter: beams\nfiring_ns: {value: %s, from: assumed}\n",
+            firing_ns);
+    fprintf(f, "beams: [{elevation_deg: 0, offset_ns: 0, from: assumed}]\n");
+    static const struct {
+        const char *key;
+        double value;
+    } figure[] = {{"range_min_m", 0.5},   {"range_max_m", 100},   {"range_sigma_m", 0},
+                  {"range_sigma_ppm", 0}, {"wavelength_nm", 903}, {"mirror_counts", 0},
+                  {"pan_counts", 0},      {"beam_exit_m", 0.01},  {"beam_divergence_rad", 0.003},
+                  {"pulse_width_ns", 6},  {"max_echoes", 2},      {"boot_s", 0.2},
+                  {"spin_up_s", 0.03},    {"spin_down_s", 0.2}};
+    for (size_t i = 0; i < sizeof figure / sizeof *figure; i++)
+        fprintf(f, "%s: {value: %g, from: assumed}\n", figure[i].key, figure[i].value);
+    fprintf(f, "lines_min_hz: {value: %d, from: assumed}\nlines_max_hz: {value: %d, from: assumed}\n", lines_hz,
+            lines_hz);
+    assert_int_equal(fclose(f), 0);
+}
+
+/* A rotor that has one speed can only turn slower, but never slower than half of it. So a phase may need two seconds.
+ * A head whose turn is one firing sequence can't turn faster at all: it would have turns without a pulse. */
+static void a_rotor_at_its_limits(void **state)
+{
+    (void)state;
+    char profile[128];
+    snprintf(profile, sizeof profile, "head.profile=%s/head.yaml", folder);
+    static const char *const phases[] = {"head.phase_deg=0", "head.phase_deg=100", "head.phase_deg=200"};
+    static const struct {
+        const char *lines, *firing_ns;
+        int lines_hz, spare_uhz;
+    } heads[] = {{"head.lines_hz=1", "55296", 1, 2000}, {"head.lines_hz=20", "50000000", 20, 0}};
+    for (size_t i = 0; i < 6; i++) {
+        const char *const sets[] = {profile, phases[i % 3], heads[i / 3].lines, "head.phase_lock=on", "links=[]"};
+        const int64_t set_uhz = 1000000 * heads[i / 3].lines_hz;
+        write_beam(heads[i / 3].lines_hz, heads[i / 3].firing_ns);
+        struct rig *rig = open_with(sets, 5);
+        for (int s = 1; s < 9; s++) {
+            const double beyond_deg = beyond(turn_at(rig, s + 0.6), 0);
+            const int64_t uhz = rig->work.segment.spec.lines_uhz;
+            if (uhz < set_uhz / 2 || uhz > set_uhz + heads[i / 3].spare_uhz || !isfinite(beyond_deg))
+                fail_msg("%s, %s: at second %d it turns %lld uHz", sets[1], sets[2], s, (long long)uhz);
+            if (s >= 5 && uhz < set_uhz - 2000)
+                fail_msg("%s, %s: at second %d it still turns %lld uHz", sets[1], sets[2], s, (long long)uhz);
+        }
+        if (i < 3) assert_true(fabs(beyond(turn_at(rig, 9.5), 100.0 * (double)i)) <= EXACT_DEG);
         rig_close(rig);
     }
 }
@@ -308,6 +369,7 @@ int main(void)
         cmocka_unit_test(late_sentences_are_not_lost),
         cmocka_unit_test(late_pulses_have_their_second),
         cmocka_unit_test(the_rotor_is_where_the_lock_wants_it),
+        cmocka_unit_test(a_rotor_at_its_limits),
         cmocka_unit_test(the_phase_is_lost_with_the_pulses),
         cmocka_unit_test(only_whole_turns_are_held),
     };
