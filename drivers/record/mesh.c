@@ -17,6 +17,7 @@
 #include "core/studio/mesh.h"
 #include "core/newfile.h"
 #include "drivers/record/mesh_recorder.h"
+#include "drivers/record/ply_columns.h"
 #include "drivers/record/mesh_texture.h"
 
 static const double GIB = 1073741824.0;
@@ -273,6 +274,7 @@ static void mesh_report(const struct mesh_recorder *m)
     recorder_report(r, m->n_later, "echoes left out; a mesh holds the first of a shot");
     recorder_report(r, m->n_lost, "points left out whose pose was lost");
     recorder_report(r, m->n_split, "additional meshes begun within a scan, since its line or row numbers went back");
+    recorder_report(r, ply_count_unnamed(&r->track), PLY_UNNAMED);
     if (m->every > 1) {
         snprintf(what, sizeof what, "lines and rows share one texel, since a texture has up to %d texels a side",
                  MESH_TEXTURE_SIDE);

@@ -51,6 +51,15 @@ static uint64_t put_names(FILE *out, const char *before, const struct scanhead *
     return n_left_out;
 }
 
+uint64_t ply_count_unnamed(const struct track *track)
+{
+    const char *object, *material;
+    uint64_t n = 0;
+    for (uint32_t label = 0; track->named != NULL && label < track->n_named && label < SCANHEAD_NO_LABEL; label++)
+        n += (uint64_t)!scanhead_surface(track->named, label, &object, &material);
+    return n;
+}
+
 void ply_put_names(FILE *out, const char *before, const struct scanhead *sh)
 {
     put_names(out, before, sh, SIZE_MAX);
