@@ -69,8 +69,8 @@ static int is_same_name(const struct named *a, const struct named *b)
            app_is_name_of_scan(name[1], b->n_ending, name[0]);
 }
 
-/* Whether both are the same file, also under two names. Devices and pipes may be given twice. Standard output, as -, may
- * not: two of a command's files there, say CSV and JSON, would be one text that nothing reads. */
+/* Whether both are the same file, also under two names. Devices and pipes may be given twice. Standard output, as -,
+ * may not: two of a command's files there, say CSV and JSON, would be one text that nothing reads. */
 static int outputs_is_same(const struct named *a, const struct named *b)
 {
     const int both = a->is_there && b->is_there;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Streams that lost frames between scans, or whose settings change. No point gets another station, row or pose than its own. */
+/* Streams that lost frames between scans, or whose settings change. No point gets another station, row or pose than its
+ * own. */
 #include "tests/unit/e57_rig.h"
 
 static const struct rig_point one = {3000, -4000, 12000, -1234, 7, 1, 1};

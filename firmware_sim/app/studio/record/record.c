@@ -290,8 +290,8 @@ static const struct app_option OPTIONS[] = {
      .help = "frames per scan; 0: without end"},
     {APP_NUMBER, "duration", "S", .min = 0.001, .max = 1e8, .at = AT(job.recording.duration_s),
      .help = "end each scan after S seconds of device time: with a CONFIG exact to a pulse, with a head on a wire as "
-             "soon as it carries out the command. With --listen the recording ends S seconds after a scan began; it waits for "
-             "that scan without end"},
+             "soon as it carries out the command. With --listen the recording ends S seconds after a scan began; it "
+             "waits for that scan without end"},
     {APP_FLAG, "split", NULL, .at = AT(job.files.split),
      .help = "write each scan to its own files: NAME-1.las, NAME-2.las, ..., in the order of scans"},
     {APP_FLAG, "each", NULL, .at = AT(job.each), .help = "like --split, in addition to the files of all scans"},
