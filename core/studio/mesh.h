@@ -85,6 +85,10 @@ int mesh_is_float(const char *path);
  * figures and what to do. For an early refusal; mesh_write checks the same. */
 int mesh_check_box(const char *path, const double low[3], const double high[3], struct sh_err *err);
 
+/* SH_EINPUT where a mesh can't name its other files because of its own name: in a .gltf that is no UTF-8 or has
+ * characters of URIs, in an .obj with control characters. For an early refusal; mesh_write checks the same. */
+int mesh_check_name(const char *path, struct sh_err *err);
+
 /* Writes the mesh and the files that it names, all or none (core/newfile.h): all are written as NAME.part, and once all
  * are complete they are renamed, the mesh last. Where one can't be written, none is left. SH_EINPUT: an unknown ending,
  * with the known ones; a number that is not finite; a mesh that the format can't hold. SH_ESTOPPED where report asks to

@@ -5,6 +5,7 @@
 #include <nettle/sha2.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "drivers/record/crs_wkt.h"
 #include "drivers/record/e57_note.h"
@@ -38,13 +39,14 @@ static void open_structure(FILE *out, const char *tag)
     fprintf(out, "<%s type=\"Structure\">\n", tag);
 }
 
-/* The guid is made from the scan's facts, so that the same stream gives the same file. The guid is a UUID of version 8
- * (RFC 9562). */
-static void put_guid(FILE *out, const void *content, size_t len)
+/* The guid is made from the scan's facts, so that the same stream gives the same file. `whose` keeps the guid of a file
+ * with one scan apart from the scan's. The guid is a UUID of version 8 (RFC 9562). */
+static void put_guid(FILE *out, const char *whose, const void *content, size_t len)
 {
     struct sha256_ctx sha256;
     uint8_t d[SHA256_DIGEST_SIZE];
     sha256_init(&sha256);
+    sha256_update(&sha256, strlen(whose), (const uint8_t *)whose);
     sha256_update(&sha256, len, content);
     sha256_digest(&sha256, sizeof d, d);
     d[6] = (uint8_t)((d[6] & 0x0f) | 0x80);
@@ -101,11 +103,13 @@ static void put_bounds(FILE *out, const struct e57_scan *s)
     }
 }
 
+/* The stream says which time it is, but not from which clock the head has it: GNSS, or its computer's. The standard
+ * wants 1 only where an atomic clock is known to be the source. */
 static void put_time(FILE *out, const char *tag, double gps_s)
 {
     open_structure(out, tag);
     put_float(out, "dateTimeValue", gps_s);
-    put_integer(out, "isAtomicClockReferenced", 1);
+    put_integer(out, "isAtomicClockReferenced", 0);
     fprintf(out, "</%s>\n", tag);
 }
 
@@ -156,7 +160,7 @@ static void put_scan(FILE *out, const struct e57_facts *facts, const struct e57_
     char name[64], text[sizeof s->idn + 64];
     snprintf(name, sizeof name, "scan %u, station %u", s->number, s->station);
     open_structure(out, "vectorChild");
-    put_guid(out, s, sizeof *s);
+    put_guid(out, "", s, sizeof *s);
     put_string(out, "name", name);
     snprintf(text, sizeof text, "%s%s", s->idn,
              facts->is_incomplete && s->number == facts->n_scans ? "; repaired: its end is missing" : "");
@@ -182,7 +186,7 @@ static void put_root(FILE *out, const struct e57_facts *facts)
           "xmlns:sh=\"urn:scanhead:e57\">\n",
           out);
     put_string(out, "formatName", "ASTM E57 3D Imaging Data File");
-    put_guid(out, facts->scan, facts->n_scans * sizeof *facts->scan);
+    put_guid(out, "file", facts->scan, facts->n_scans * sizeof *facts->scan);
     put_integer(out, "versionMajor", 1);
     put_integer(out, "versionMinor", 0);
     put_string(out, "e57LibraryVersion", "scanhead");

@@ -17,6 +17,7 @@
 #include "core/studio/mesh.h"
 #include "core/newfile.h"
 #include "drivers/record/mesh_recorder.h"
+#include "drivers/record/ply_columns.h"
 #include "drivers/record/mesh_texture.h"
 
 static const double GIB = 1073741824.0;
@@ -178,23 +179,10 @@ static int try_sidecar(const struct mesh_recorder *m, const char *ending, struct
     return rc;
 }
 
-/* glTF names files as URIs. Assimp's exporter writes their names as they are. */
-static int check_uri(const struct mesh_recorder *m, struct sh_err *err)
-{
-    const char *path = m->base.file.path, *ending = m->base.ops->ending;
-    const char *c = strpbrk(basename(path), "%#?:\\");
-    if (strcmp(ending, ".gltf") != 0 || c == NULL) return SH_OK; /* .glb holds all */
-    return sh_fail(
-        err, SH_EINPUT,
-        "%s: %s refers to its other files by URIs, where %c has a special meaning; allowed are names without %% # ? : "
-        "\\",
-        path, ending, *c);
-}
-
 static int mesh_begin(void *rec, struct sh_err *err)
 {
     const struct mesh_recorder *m = rec;
-    int rc = check_uri(m, err);
+    int rc = mesh_check_name(m->base.file.path, err);
     const int has_image = is_textured(m) && strcmp(m->base.ops->ending, ".glb") != 0;
     if (rc == SH_OK && has_image) rc = try_sidecar(m, ".png", err);
     if (rc == SH_OK && is_textured(m) && strcmp(m->base.ops->ending, ".obj") == 0) rc = try_sidecar(m, ".mtl", err);
@@ -286,6 +274,7 @@ static void mesh_report(const struct mesh_recorder *m)
     recorder_report(r, m->n_later, "echoes left out; a mesh holds the first of a shot");
     recorder_report(r, m->n_lost, "points left out whose pose was lost");
     recorder_report(r, m->n_split, "additional meshes begun within a scan, since its line or row numbers went back");
+    recorder_report(r, ply_count_unnamed(&r->track), PLY_UNNAMED);
     if (m->every > 1) {
         snprintf(what, sizeof what, "lines and rows share one texel, since a texture has up to %d texels a side",
                  MESH_TEXTURE_SIDE);

@@ -46,6 +46,8 @@ static void put_facts(const struct mesh_recorder *m, uint32_t n_sparse, FILE *ou
     if (o->sparse_per_m2 > 0)
         fprintf(out, "sparse %g points per m2, seed %" PRIu64 ": %u points on %.9g m2\n", o->sparse_per_m2,
                 o->sparse_seed, n_sparse, m->area_m2);
+    if (t->has_colours && (!is_ply(m) || o->columns == 0 || (o->columns & PLY_COLOUR) != 0))
+        ply_put_colours(out, "", t);
     ply_put_names(out, "", t->named != NULL ? t->named : t->sh);
 }
 
@@ -140,6 +142,9 @@ static int write_sparse(struct mesh_recorder *m, struct sh_err *err)
         rc = name_path(m, mesh_sparse_add(&sparse, &m->points, &part, &out, &m->area_m2, err), err);
         face += p->n_faces;
     }
+    if (rc == SH_OK && out.n == 0 && m->n_faces > 0)
+        sh_warn(o->report, "%s: --sparse %g: no point on %.4g m2 of mesh", m->base.track.path, o->sparse_per_m2,
+                m->area_m2);
     if (rc == SH_OK) rc = write_mesh(m, &out, NULL, err);
     mesh_points_free(&out);
     return rc;

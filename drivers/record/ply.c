@@ -58,6 +58,7 @@ static int write_header(struct ply *ply, int incomplete, struct sh_err *err)
     if (!incomplete)
         recorder_report(&ply->base, n_left_out + ply->n_heads_beyond,
                         "names of surfaces and heads left out; the header has no room for them");
+    if (!incomplete) recorder_report(&ply->base, ply_count_unnamed(&ply->base.track), PLY_UNNAMED);
     rc = file->written == 0 ? outfile_write(file, text, len, err) : outfile_patch(file, 0, text, len, err);
     free(text);
     return rc;

@@ -51,6 +51,15 @@ static uint64_t put_names(FILE *out, const char *before, const struct scanhead *
     return n_left_out;
 }
 
+uint64_t ply_count_unnamed(const struct track *track)
+{
+    const char *object, *material;
+    uint64_t n = 0;
+    for (uint32_t label = 0; track->named != NULL && label < track->n_named && label < SCANHEAD_NO_LABEL; label++)
+        n += (uint64_t)!scanhead_surface(track->named, label, &object, &material);
+    return n;
+}
+
 void ply_put_names(FILE *out, const char *before, const struct scanhead *sh)
 {
     put_names(out, before, sh, SIZE_MAX);
@@ -63,19 +72,19 @@ static void put_head(FILE *out, const struct ply_head *head, int several)
     fprintf(out, "comment %sidn %s\ncomment %sprofile %s\n", whose, head->idn, whose, head->profile);
 }
 
-static void put_colour_comment(FILE *out, const struct track *t)
+void ply_put_colours(FILE *out, const char *before, const struct track *t)
 {
     const struct colour_scale *scale = &t->colour.scale;
+    fprintf(out, "%sred green blue ", before);
     if (!t->colour.given)
-        fputs("comment red green blue as the head sent them (output.colour)\n", out);
+        fputs("as the head sent them (output.colour)\n", out);
     else if (colour_has_limits(scale->mode))
-        fprintf(out, "comment red green blue show the %s, blue is %.9g, red %.9g%s\n", colour_words[scale->mode],
-                scale->low, scale->high, scale->mode == COLOUR_FRAME ? "" : " m");
+        fprintf(out, "show the %s, blue is %.9g, red %.9g%s\n", colour_words[scale->mode], scale->low, scale->high,
+                scale->mode == COLOUR_FRAME ? "" : " m");
     else if (scale->mode == COLOUR_REFLECTANCE)
-        fputs("comment red green blue show the reflectance, black is -30 dB, white 0 dB, blue not modelled\n", out);
+        fputs("show the reflectance, black is -30 dB, white 0 dB, blue not modelled\n", out);
     else
-        fprintf(out, "comment red green blue %s\n",
-                scale->mode == COLOUR_LABEL ? "show the label" : "are one colour for all");
+        fprintf(out, "%s\n", scale->mode == COLOUR_LABEL ? "show the label" : "are one colour for all");
 }
 
 /* Puts the counts of lost frames and pulses, which are known at the end. */
@@ -121,7 +130,7 @@ static void put_comments(FILE *out, const struct ply_facts *facts)
     if (t->moving && !facts->incomplete)
         fprintf(out, "comment points_without_pose %" PRIu64 "\n", facts->n_without_pose);
     if (t->stops) fputs("comment the stations are stops on a trajectory; frame: its frame scalar there\n", out);
-    if ((facts->columns & PLY_COLOUR) != 0) put_colour_comment(out, t);
+    if ((facts->columns & PLY_COLOUR) != 0) ply_put_colours(out, "comment ", t);
     fprintf(out, "comment empty_shots %s\n", facts->empty_shots ? "kept" : "left out");
     if (!facts->incomplete) put_losses(out, facts);
 }

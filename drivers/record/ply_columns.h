@@ -45,6 +45,14 @@ size_t ply_row_len(unsigned columns);
 const char *ply_crs_text(const struct track *track);
 /* Puts a line "label N OBJECT | MATERIAL", with `before` in front, for each surface that the stream has named. */
 void ply_put_names(FILE *out, const char *before, const struct scanhead *sh);
+/* Returns how many surfaces of the head have no name, because the stream ended before it had named all. */
+uint64_t ply_count_unnamed(const struct track *track);
+/* Puts a line with the meaning of the colours and their limits, with `before` in front. */
+void ply_put_colours(FILE *out, const char *before, const struct track *track);
+
+/* For recorder_report, with the count of ply_count_unnamed. */
+#define PLY_UNNAMED \
+    "surfaces have no name in the header: the stream ended before their names came; --surfaces of a CONFIG has all"
 
 /* Returns the bytes to leave for the header: for all that is known now, and for names of n_surfaces not known yet. */
 size_t ply_header_reserve(const struct ply_facts *facts, uint32_t n_surfaces);

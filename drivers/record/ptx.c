@@ -104,7 +104,8 @@ static int ptx_scan(void *rec, struct sh_err *err)
     const int kind = ptx->base.track.emitter.kind;
     if (kind == SCANHEAD_EMIT_BEAMS || kind == SCANHEAD_EMIT_DIRECTIONS)
         return sh_fail(err, SH_EFORMAT,
-                       "%s: a PTX grid has rows and columns, but this head fires %s; allowed are .ply .las .e57 .shs",
+                       "%s: a PTX grid has rows and columns, but this head fires %s; allowed are .ply .las .e57 "
+                       ".poses.csv .waves.csv .shs .pcapng",
                        ptx->base.track.path, kind == SCANHEAD_EMIT_BEAMS ? "beams in turn" : "along a list");
     int rc = end_scan(ptx, err);
     ptx->pose = ptx->base.track.pose;

@@ -144,8 +144,9 @@ static uint64_t firing_at(const struct scanhead_emitter *e, uint64_t t_ns)
     return (uint64_t)sequence * e->n_beams + i;
 }
 
-/* The end of a line says where the next one begins. Where that end was lost, the row is computed from the
- * times in the frame. The row is right as long as the pulse rate is that of the descriptor. */
+/* The end of a line says where the next one begins. A line in which settings changed goes on at its angle, which the
+ * phase knows. Where neither is known, the row is computed from the times in the frame. The row is then right as long
+ * as the pulse rate is that of the descriptor. */
 static uint64_t first_row(const struct track *t, const struct scanhead_frame *frame)
 {
     if (t->state.have_next_line && t->state.next_line == frame->scan_line && t->state.next_line_pulse0 <= frame->pulse0)
@@ -154,6 +155,8 @@ static uint64_t first_row(const struct track *t, const struct scanhead_frame *fr
         const uint64_t first = firing_at(&t->emitter, (uint64_t)frame->line_t0_ns);
         return first < frame->pulse0 ? frame->pulse0 - first : 0;
     }
+    uint64_t row;
+    if (track_phase_row(&t->state.phase, frame->scan_line, frame->pulse0, &row)) return row;
     double since_s = 1e-9 * ((double)frame->scan_t0_ns - (double)frame->line_t0_ns);
     return whole_u32(since_s * t->info.prr_hz);
 }
@@ -253,6 +256,7 @@ static int track_take_points(struct track *t, const struct scanhead_frame *frame
     t->line = frame->scan_line;
     t->sweep = frame->scan_frame;
     t->t0_ns = frame->scan_t0_ns;
+    if (begins && !t->state.new_scan) track_phase_restart(&t->state.phase); /* its descriptor was lost */
     if (rc == 0 && begins) rc = begin_scan(t, err);
     t->state.last_pulse0 = frame->pulse0;
     t->state.last_station = t->info.station;
@@ -272,6 +276,26 @@ static void take_line_end(struct track *t, const struct scanhead_frame *frame)
     if (!t->state.have_next_line) return;
     t->state.next_line = end.line + 1;
     t->state.next_line_pulse0 = end.pulse0 + end.n_fired;
+    track_phase_line(&t->state.phase, t->state.next_line, t->state.next_line_pulse0);
+}
+
+static void take_descriptor(struct track *t, const struct scanhead_frame *frame)
+{
+    struct track_state *s = &t->state;
+    struct native_descriptor d;
+    const int repeats = (frame->flags & SCANHEAD_REPEAT) != 0;
+    if (!repeats) {
+        s->new_scan = 1;
+        s->have_next_line = 0;
+    }
+    if (native_decode_descriptor(frame->payload, frame->payload_len, &d) != 0) return;
+    set_limits(t, &d);
+    if (repeats && s->phase.den != 0) return;
+    if (s->changes)
+        track_phase_change(&s->phase, s->change_pulse, d.prr_uhz, d.lines_uhz);
+    else
+        track_phase_start(&s->phase, d.prr_uhz, d.lines_uhz);
+    s->changes = 0;
 }
 
 /* A scan with another start is another one, also where it has the number of the last one and its first descriptor was
@@ -281,6 +305,16 @@ static void take_scan_start(struct track *t, const struct scanhead_frame *frame)
     if ((int64_t)frame->event_value[1] == t->state.last_begin_ns) return;
     t->state.new_scan = 1;
     t->state.have_next_line = 0;
+    track_phase_restart(&t->state.phase);
+}
+
+/* Where a scan begins, the head sends SCAN_START before the descriptor, and where settings change, SETTINGS. */
+static void take_event(struct track *t, const struct scanhead_frame *frame)
+{
+    if (frame->event != SCANHEAD_EV_SETTINGS && frame->event != SCANHEAD_EV_SCAN_START) return;
+    t->state.changes = frame->event == SCANHEAD_EV_SETTINGS;
+    t->state.change_pulse = frame->event_value[0];
+    if (!t->state.changes) take_scan_start(t, frame);
 }
 
 int track_frame(struct track *t, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
@@ -294,14 +328,8 @@ int track_frame(struct track *t, struct scanhead *sh, const struct scanhead_fram
         take_line_end(t, frame);
         return t->has_waves ? track_flush(t, err) : 0;
     }
-    struct native_descriptor d;
-    if (frame->type == SCANHEAD_DESCRIPTOR && native_decode_descriptor(frame->payload, frame->payload_len, &d) == 0)
-        set_limits(t, &d);
+    if (frame->type == SCANHEAD_DESCRIPTOR) take_descriptor(t, frame);
     if (frame->type == SCANHEAD_EMITTER) set_emitter_limits(t);
-    if (frame->type == SCANHEAD_EVENT && frame->event == SCANHEAD_EV_SCAN_START) take_scan_start(t, frame);
-    if (frame->type == SCANHEAD_DESCRIPTOR && (frame->flags & SCANHEAD_REPEAT) == 0) {
-        t->state.new_scan = 1;
-        t->state.have_next_line = 0;
-    }
+    if (frame->type == SCANHEAD_EVENT) take_event(t, frame);
     return 0;
 }

@@ -22,6 +22,7 @@
 #include "drivers/host/scanhead.h"
 #include "drivers/record/colour.h"
 #include "drivers/record/station_pose.h"
+#include "drivers/record/track_phase.h"
 
 enum { TRACK_BATCH = 256 };
 
@@ -73,6 +74,9 @@ struct track_missing {
 /* The place of the stream in its scan; only track.c uses it. */
 struct track_state {
     int new_scan, have_next_line;
+    int changes; /* settings change with the next descriptor, from change_pulse on */
+    uint64_t change_pulse;
+    struct track_phase phase;
     uint32_t next_line, last_station, last_scan;
     uint64_t next_line_pulse0, last_pulse0;
     int64_t last_begin_ns; /* device time of pulse 0 of the scan of the last points */

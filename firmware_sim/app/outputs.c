@@ -69,12 +69,13 @@ static int is_same_name(const struct named *a, const struct named *b)
            app_is_name_of_scan(name[1], b->n_ending, name[0]);
 }
 
-/* Whether both are the same file, also under two names. Devices and pipes may be given twice, and so may -, which is
- * standard output. */
+/* Whether both are the same file, also under two names. Devices and pipes may be given twice. Standard output, as -,
+ * may not: two of a command's files there, say CSV and JSON, would be one text that nothing reads. */
 static int outputs_is_same(const struct named *a, const struct named *b)
 {
     const int both = a->is_there && b->is_there;
-    if (strcmp(a->path, "-") == 0 || strcmp(b->path, "-") == 0) return 0;
+    const int a_out = strcmp(a->path, "-") == 0, b_out = strcmp(b->path, "-") == 0;
+    if (a_out || b_out) return a_out && b_out;
     if ((a->is_there && !S_ISREG(a->st.st_mode)) || (b->is_there && !S_ISREG(b->st.st_mode))) return 0;
     if (both && a->st.st_dev == b->st.st_dev && a->st.st_ino == b->st.st_ino) return 1;
     return is_same_name(a, b);

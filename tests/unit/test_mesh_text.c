@@ -56,10 +56,49 @@ static void obj_materials(void **state)
     mesh.n_parts = 2;
     rig_write("a.obj", &mesh);
     expect_text("a.obj", "mtllib a.mtl\no first one\nv 1 2 3\nvt 0.125 0.25\nv 2.5 2.125 3.25\nvt 0.5 0\nv 2.75 4 3.5\n"
-                         "vt 1 -1\nusemtl first one\nf 1/1 2/2 3/3\no second\nv -7 0.5 1.75\nvt 0 0.75\n"
+                         "vt 1 -1\nusemtl first_one\nf 1/1 2/2 3/3\no second\nv -7 0.5 1.75\nvt 0 0.75\n"
                          "usemtl second\nf 4/4 4/4 4/4\n");
-    expect_text("a.mtl", "newmtl first one\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nd 1\nillum 1\n"
+    expect_text("a.mtl", "newmtl first_one\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nd 1\nillum 1\n"
                          "newmtl second\nKa 0 0 0\nKd 1 1 1\nKs 0 0 0\nd 1\nillum 1\nmap_Kd b.png\n");
+}
+
+static void expect_name(const char *name, const char *why)
+{
+    rig_err.text[0] = '\0';
+    assert_int_equal(mesh_check_name(name, &rig_err), why == NULL ? SH_OK : SH_EINPUT);
+    assert_string_equal(rig_err.text, why != NULL ? why : "");
+}
+
+/* Only the name counts, not its folder. .glb and .fbx name no other file as text. */
+static void names_that_no_mesh_can_refer_to(void **state)
+{
+    (void)state;
+    expect_name("x\ny/a b.obj", NULL);
+    expect_name("a\nb.obj", "a?b.obj: a line of .obj names its other files; allowed are names without control "
+                            "characters");
+    expect_name("x%y/a \xc3\xa9.gltf", NULL);
+    expect_name("a\xc3.gltf", "a?.gltf: .gltf is UTF-8, and so are the names of its files; allowed is such a name");
+    expect_name("a?b.gltf", "a?b.gltf: .gltf refers to its other files by URIs, where ? has a special meaning; allowed "
+                            "are names without % # ? : \\");
+    expect_name("a%\xc3\n.glb", NULL);
+}
+
+/* Names of the files beside a .gltf are URIs, which have no blanks and braces. Letters of other languages stay. */
+static void gltf_names_are_uris(void **state)
+{
+    (void)state;
+    static const struct mesh_part one[1] = {{"station 1", 4, 2, "an {image}.png", NULL}};
+    struct mesh mesh = rig_mesh();
+    size_t len;
+    mesh.uv = rig_uv;
+    mesh.part = one;
+    mesh.n_parts = 1;
+    rig_write("a \xc3\xa9 b.gltf", &mesh);
+    char *text = rig_take("a \xc3\xa9 b.gltf", &len);
+    assert_non_null(strstr(text, "\"a%20\xc3\xa9%20b.bin\""));
+    assert_non_null(strstr(text, "\"an%20%7Bimage%7D.png\""));
+    free(text);
+    free(rig_take("a \xc3\xa9 b.bin", &len));
 }
 
 /* All that a vertex can have, as text. A float has up to nine digits, since that is enough to get it back. */
@@ -172,9 +211,10 @@ static void coordinates_as_text(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(obj_faces_name_what_there_is), cmocka_unit_test(obj_materials),
-        cmocka_unit_test(ply_text_of_all_columns),      cmocka_unit_test(ply_bytes_of_all_columns),
-        cmocka_unit_test(ply_has_up_to_eight_figures),  cmocka_unit_test(coordinates_as_text),
+        cmocka_unit_test(obj_faces_name_what_there_is),    cmocka_unit_test(obj_materials),
+        cmocka_unit_test(names_that_no_mesh_can_refer_to), cmocka_unit_test(gltf_names_are_uris),
+        cmocka_unit_test(ply_text_of_all_columns),         cmocka_unit_test(ply_bytes_of_all_columns),
+        cmocka_unit_test(ply_has_up_to_eight_figures),     cmocka_unit_test(coordinates_as_text),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -73,7 +73,9 @@ static void files_are_apart(void **state)
     assert_int_equal(check("lossy-udp", "sub/a", "a"), SH_OK);
     assert_int_equal(rmdir("sub"), 0);
     assert_int_equal(check("lossy-udp", "lossy-udp", NULL), SH_OK); /* the scenario is no file here */
-    assert_int_equal(check("lossy-udp", "-", "-"), SH_OK);          /* standard output */
+    assert_int_equal(check("lossy-udp", "-", "-"), SH_EINPUT);      /* standard output */
+    assert_string_equal(err.text, "--truth -: --stats writes the same file; name another one");
+    assert_int_equal(check("-", "-", NULL), SH_OK); /* standard input and output */
     write_text("a", "");
     write_text("run.yaml", "");
     assert_int_equal(check(NULL, "a", "./a"), SH_EINPUT);

@@ -278,6 +278,21 @@ static void test_late_names(void **state)
     assert_non_null(strstr(note, comment));
 }
 
+/* The stream ends before it has named all surfaces. */
+static void test_names_that_never_come(void **state)
+{
+    (void)state;
+    static const struct sh_report report = {.warn = keep_note};
+    struct sh_err err;
+    begin_stream();
+    put_surfaces(2, 1, NULL);
+    put_descriptor(1, 1, 3);
+    put_anchor(NATIVE_CRS_UTM, 32632, 2);
+    put_points(0);
+    assert_int_equal(record(out_path, (struct recorder_options){.report = &report}, 1, &err), 0);
+    assert_non_null(strstr(note, ": 2 surfaces have no name in the header"));
+}
+
 static void test_points_before_descriptor(void **state)
 {
     (void)state;
@@ -346,6 +361,7 @@ int main(void)
         cmocka_unit_test(test_empty_shots),
         cmocka_unit_test(test_polar),
         cmocka_unit_test(test_late_names),
+        cmocka_unit_test(test_names_that_never_come),
         cmocka_unit_test(test_points_before_descriptor),
         cmocka_unit_test(test_losses_are_told),
         cmocka_unit_test(test_crs_change_refused),

@@ -27,6 +27,7 @@ static int make(void **state)
     cfg->profile.emitter.kind = EMITTER_LINE;
     cfg->head.settings.frames = 1;
     cfg->head.settings.pan_udeg_s = 1000000;
+    cfg->head.settings.pan_stop_udeg = 360000000;
     cfg->output.layout = LINE_GEO;
     cfg->output.crs = GEOREF_LOCAL;
     job->recording.frames = -1;
@@ -191,11 +192,14 @@ static void meshes_need_a_surface(void **state)
     static const char line[] =
         "record: -o a.obj: a mesh needs a surface, but this head scans a single line: it neither "
         "pans nor moves, and has one ring; allowed are .ply (without --mesh and --sparse) .las "
-        ".ptx .e57 .shs";
+        ".ptx .e57 .poses.csv .waves.csv .shs .pcapng";
     (void)state;
     FILES("a.ply", "a.obj");
     accepts();
     cfg->head.settings.pan_udeg_s = 0;
+    refuses(line);
+    cfg->head.settings.pan_udeg_s = 1000000;
+    cfg->head.settings.pan_start_udeg = 360000000; /* the range of the pan is empty: one line (core/schedule.h) */
     refuses(line);
     cfg->platform.kind = PLATFORM_TRAJECTORY; /* it moves */
     accepts();
@@ -215,11 +219,11 @@ static void meshes_need_a_surface(void **state)
     accepts();
     cfg->profile.emitter.kind = EMITTER_BEAMS;
     refuses("record: -o a.ptx: a grid has rows and columns, but this head fires beams in turn; allowed are .ply .las "
-            ".e57 .shs");
+            ".e57 .poses.csv .waves.csv .shs .pcapng");
     cfg->profile.emitter.kind = EMITTER_DIRECTIONS;
     refuses(
         "record: -o a.ptx: a grid has rows and columns, but this head fires along a list; allowed are .ply .las .e57 "
-        ".shs");
+        ".poses.csv .waves.csv .shs .pcapng");
     FILES("a.ply", "a.las", "a.e57", "a.shs");
     accepts();
 }

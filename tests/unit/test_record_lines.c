@@ -98,7 +98,8 @@ static const struct lines_row POINTS[] = {
     {"--colour texture needs a CONFIG as SOURCE; a head on a wire sends the texels itself if its configuration has "
      "output.colour: texture",
      {"record tcp:a:1 -o a.ply --colour texture"}},
-    {"SOURCE nothing: allowed usb, usb:VID:PID:SERIAL, tty:PATH, tcp:HOST:PORT, FILE.shs, FILE.pcapng, CONFIG.yaml",
+    {"SOURCE nothing: allowed usb, usb:VID:PID:SERIAL, tty:PATH, tcp:HOST:PORT, fd:N, FILE.shs, FILE.pcapng, "
+     "CONFIG.yaml",
      {"record nothing -o a.ply"}},
     {"--set, --crs and --threads need a CONFIG as SOURCE",
      {"record tcp:a:1 -o a.ply --set a=b", "record tcp:a:1 -o a.ply --crs utm"}},

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Streams that lost frames between scans. No point gets another station, row or pose than its own. */
+/* Streams that lost frames between scans, or whose settings change. No point gets another station, row or pose than its
+ * own. */
 #include "tests/unit/e57_rig.h"
 
 static const struct rig_point one = {3000, -4000, 12000, -1234, 7, 1, 1};
@@ -114,6 +115,50 @@ static void test_rows_of_another_scan(void **state)
     assert_int_equal(e57rig_record[0].column, 4);
 }
 
+static void put_rates(uint32_t lines_hz)
+{
+    const struct native_descriptor d = {.idn = "a,b,c,d",
+                                        .profile = "model",
+                                        .scan = 1,
+                                        .layout = NATIVE_GEO,
+                                        .prr_uhz = 1000000000,
+                                        .lines_uhz = lines_hz * 1000000};
+    rig_put(out, native_encode_descriptor(out, sizeof out, &d, 0, 0));
+}
+
+/* Line 1 has 100 rows, then the line rate becomes four times as high: half way a line has 12.5 of its 25 rows behind
+ * it, and the pulse at the same angle is in row 12. Where the event that names the pulse is lost, times remain. */
+static void test_settings_change_within_a_line(void **state)
+{
+    (void)state;
+    const struct native_event change = {.code = NATIVE_EV_SETTINGS, .a = 150};
+    rig_begin();
+    put_rates(10);
+    put_anchor(1);
+    rig_points(0, 0, 30, &one, 1);
+    put_line_end(0, 0, 100);
+    rig_points(1, 100, 149, &one, 1);
+    rig_put(out, native_encode_event(out, sizeof out, &change, 0, 0));
+    put_rates(40);
+    put_anchor(1);
+    rig_points(1, 100, 150, &one, 1);
+    rig_points(1, 100, 156, &one, 1);
+    put_line_end(1, 100, 63);
+    rig_points(2, 163, 170, &one, 1);
+    expect_scans(2);
+    static const struct {
+        uint32_t row, column;
+    } want[2][3] = {{{30, 0}, {49, 1}}, {{12, 1}, {18, 1}, {7, 2}}};
+    for (int scan = 0; scan < 2; scan++) {
+        e57rig_scan(scan, 0, 0);
+        assert_int_equal(e57rig_n_records, 2 + scan);
+        for (int i = 0; i < 2 + scan; i++) {
+            assert_int_equal(e57rig_record[i].row, want[scan][i].row);
+            assert_int_equal(e57rig_record[i].column, want[scan][i].column);
+        }
+    }
+}
+
 static void put_poses(int64_t from_ms, int64_t to_ms, double y_m)
 {
     const struct native_pose pose[2] = {{.t_ns = from_ms * 1000000, .position_m = {0, y_m, 0}, .quat = {1, 0, 0, 0}},
@@ -182,6 +227,7 @@ int main(void)
         cmocka_unit_test(test_same_station),
         cmocka_unit_test(test_same_number),
         cmocka_unit_test(test_rows_of_another_scan),
+        cmocka_unit_test(test_settings_change_within_a_line),
         cmocka_unit_test(test_poses_of_another_scan),
         cmocka_unit_test(test_anchor_of_another_stretch),
     };

@@ -292,11 +292,11 @@ static void two_stations_are_two_objects(void **state)
     char *text = rig_record_bytes("b.obj", (struct recorder_options){.long_edge = 1.2}, NULL),
          *materials = rig_take("b.mtl", NULL);
     has(text, "mtllib b.mtl\no station 1\nv 10 30 30\nvt 0.125 0.166666672\nvn 0 -1 0\n");
-    has(text, "usemtl station 1\nf ");
+    has(text, "usemtl station_1\nf ");
     has(text, "o station 2\nv 10 30 30\n");
     assert_int_equal(rig_count(text, "\nf "), 16);
     has(text, "\nf 13/13/13 "); /* the second object has vertices of its own */
-    has(materials, "newmtl station 2\n");
+    has(materials, "newmtl station_2\n");
     has(materials, "map_Kd b.2.png\n");
     free(text);
     free(materials);

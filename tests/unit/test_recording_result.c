@@ -138,6 +138,18 @@ static void missing_parts_are_named(void **state)
         &r, SH_EIO,
         "the recording is not complete: 321 frames lost to this reader, 0 pulses by the head; of the pulses that "
         "it sent 4 are missing");
+    struct recording_result joined = {.counts = {.missing = 4}, .unplaced = 3};
+    incomplete(&joined, SH_OK, ""); /* of a live stream: the recorder came within the scan */
+    joined.is_file = 1;
+    incomplete(&joined, SH_EIO,
+               "the recording is not complete: the file begins within a scan; of the pulses that the head sent 4 are "
+               "missing, and 3 points came before the descriptor and the anchor of their scan");
+    joined.counts.missing = 0;
+    incomplete(&joined, SH_EIO,
+               "the recording is not complete: the file begins within a scan; of the pulses that the head sent 0 are "
+               "missing, and 3 points came before the descriptor and the anchor of their scan");
+    joined.unplaced = 0;
+    incomplete(&joined, SH_OK, "");
     r.counts.unknown = 1;
     incomplete(
         &r, SH_EIO,

@@ -11,13 +11,14 @@
 
 static int open_file(struct exporter *e, const char *path)
 {
-    char *raw = NULL;
+    char *other = NULL;
     if (e->n_files == ASSIMP_FILES)
         return sh_fail(&e->err, SH_EIO, "%s: the exporter writes more than %d files", e->out->path, ASSIMP_FILES);
-    if (e->is_raw && asprintf(&raw, "%s.raw", path) < 0)
+    if (asprintf(&other, "%s%s", path, e->is_raw ? ".raw" : "") < 0)
         return sh_fail(&e->err, SH_ENOMEM, "%s: no memory to write it", e->out->path);
-    int rc = mesh_output_open(e->out, raw != NULL ? raw : path, &e->file[e->n_files], &e->err);
-    free(raw);
+    if (e->is_uri) mesh_uri_undo(other);
+    int rc = mesh_output_open(e->out, other, &e->file[e->n_files], &e->err);
+    free(other);
     return rc;
 }
 

@@ -15,6 +15,7 @@ struct exporter {
     struct mesh_file *file[ASSIMP_FILES]; /* in the order in which they were opened */
     struct aiFile handle[ASSIMP_FILES];
     int n_files, rc;
+    int is_uri; /* the exporter has the path as mesh_uri_of returns it */
     int is_raw; /* the exporter writes NAME.raw.part, of which the file is made */
     struct sh_err err;
     struct aiFileIO io;

@@ -67,6 +67,12 @@ const char *mesh_stem(const char *path, size_t *len);
 /* Returns the path with another ending, which the caller frees. NULL: no memory. */
 char *mesh_with_ending(const char *path, const char *ending);
 
+/* Returns the path with the characters of its name that no URI has, such as blanks, as %20 and so on. The caller frees
+ * it. NULL: no memory. */
+char *mesh_uri_of(const char *path);
+/* Turns the %20 and so on of a path from mesh_uri_of back, in place. A name of a .gltf has no % (mesh_check_name). */
+void mesh_uri_undo(char *path);
+
 struct mesh_format {
     const char *ending;
     int is_float, takes_points;

@@ -142,7 +142,8 @@ int mesh_write(const char *path, const struct mesh *mesh, const struct sh_report
     size_t len;
     const char *name = mesh_stem(path, &len);
     snprintf(work.what, sizeof work.what, "writing %s", name);
-    int rc = check(path, format, mesh, err);
+    int rc = mesh_check_name(path, err);
+    if (rc == SH_OK) rc = check(path, format, mesh, err);
     if (rc != SH_OK) return rc;
     /* A mesh without parts is one part, named as the file. Assimp's exporter must not get that name: it would choose
      * another one for the .bin of a .gltf. */

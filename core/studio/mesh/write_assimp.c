@@ -40,7 +40,7 @@ struct export_scene {
     struct aiMetadataEntry meta_value[N_META];
     int32_t axis[N_AXES];
     double unit_cm;
-    int is_fbx, holds_images;
+    int is_fbx, is_gltf, holds_images;
 };
 
 static void set_string(struct aiString *to, const char *text)
@@ -180,13 +180,17 @@ static int fill_material(struct export_scene *s, const struct mesh_part *part, s
     const int is_within = s->holds_images && part->image != NULL;
     struct aiMaterialProperty *at = own->property;
     struct aiMaterial *to = &own->material;
-    char name[16] = "";
-    if (is_within && !add_image(s, part->image, &own->texture, name)) return 0;
-    return put_string(to, &at[0], "?mat.name", 0, part->name) &&
-           put_property(to, &at[1], "$clr.diffuse", 0, (struct property){aiPTI_Float, white, sizeof white}) &&
-           put_property(to, &at[2], "$mat.roughnessFactor", 0, (struct property){aiPTI_Float, &rough, sizeof rough}) &&
-           (part->texture == NULL ||
-            put_string(to, &at[3], "$tex.file", (unsigned)aiTextureType_DIFFUSE, is_within ? name : part->texture));
+    char within[16] = "", *uri = NULL;
+    const char *name = is_within ? within : part->texture;
+    if (is_within && !add_image(s, part->image, &own->texture, within)) return 0;
+    if (s->is_gltf && name != NULL && (name = uri = mesh_uri_of(name)) == NULL) return 0;
+    const int done =
+        put_string(to, &at[0], "?mat.name", 0, part->name) &&
+        put_property(to, &at[1], "$clr.diffuse", 0, (struct property){aiPTI_Float, white, sizeof white}) &&
+        put_property(to, &at[2], "$mat.roughnessFactor", 0, (struct property){aiPTI_Float, &rough, sizeof rough}) &&
+        (part->texture == NULL || put_string(to, &at[3], "$tex.file", (unsigned)aiTextureType_DIFFUSE, name));
+    free(uri);
+    return done;
 }
 
 /* Sets z up, y to the back (FrontAxis 1, sign -1: the front is -y), and a unit of 100 cm. */
@@ -291,20 +295,23 @@ static int make_scene(struct export_scene *s, const struct mesh *m)
 static int export_scene(const struct mesh_format *format, struct mesh_output *out, const struct export_scene *s,
                         const struct mesh_work *work, struct sh_err *err)
 {
-    const char *path = out->path;
     struct assimp_lib lib;
     int rc = assimp_lib_load(&lib, err);
     if (rc != SH_OK) return rc;
-    struct exporter e = {.out = out, .is_raw = s->is_fbx, .io = {assimp_open, assimp_close, NULL}};
+    char *path = s->is_gltf ? mesh_uri_of(out->path) : strdup(out->path);
+    if (path == NULL) return sh_fail(err, SH_ENOMEM, "%s: no memory to export it", out->path);
+    struct exporter e = {
+        .out = out, .is_uri = s->is_gltf, .is_raw = s->is_fbx, .io = {assimp_open, assimp_close, NULL}};
     e.io.UserData = (char *)(void *)&e;
     sh_progress(work->report, work->what, -1);
     const enum aiReturn done = lib.aiExportSceneEx(&s->scene, format->exporter, path, &e.io, 0);
+    free(path);
     if (e.rc != SH_OK) return sh_fail(err, e.rc, "%s", e.err.text);
     rc = assimp_check_files(&e, err);
     if (rc != SH_OK) return rc;
-    if (done == aiReturn_OUTOFMEMORY) return sh_fail(err, SH_ENOMEM, "%s: no memory to export it", path);
+    if (done == aiReturn_OUTOFMEMORY) return sh_fail(err, SH_ENOMEM, "%s: no memory to export it", out->path);
     if (done != aiReturn_SUCCESS || e.n_files == 0)
-        return sh_fail(err, SH_EIO, "%s: Assimp cannot export it: %.200s", path, lib.aiGetErrorString());
+        return sh_fail(err, SH_EIO, "%s: Assimp cannot export it: %.200s", out->path, lib.aiGetErrorString());
     rc = sh_check_stop(work->report, err);
     return rc == SH_OK && e.is_raw ? assimp_copy_raw(&e, err) : rc;
 }
@@ -329,6 +336,7 @@ int mesh_write_assimp(const struct mesh_format *format, struct mesh_output *out,
                       struct mesh_work *work, struct sh_err *err)
 {
     struct export_scene s = {.is_fbx = strcmp(format->exporter, "fbx") == 0,
+                             .is_gltf = strcmp(format->exporter, "gltf2") == 0,
                              .holds_images = strcmp(format->exporter, "glb2") == 0};
     int rc = check_size(format, out->path, mesh, s.is_fbx, err);
     if (rc != SH_OK) return rc;

@@ -22,6 +22,15 @@ static int has_textures(const struct mesh *mesh)
     return 0;
 }
 
+/* The name of a material ends at a blank: for many readers the rest of the line is something else. */
+static void put_material(FILE *out, const char *key, const char *name)
+{
+    fputs(key, out);
+    for (; *name != '\0'; name++)
+        fputc(*name == ' ' ? '_' : (unsigned char)*name < 0x20 || *name == 0x7f ? '?' : *name, out);
+    fputc('\n', out);
+}
+
 static int write_materials(const struct obj *o, struct mesh_output *out, const char *path, struct sh_err *err)
 {
     struct mesh_file *file;
@@ -29,7 +38,7 @@ static int write_materials(const struct obj *o, struct mesh_output *out, const c
     if (rc != SH_OK) return rc;
     for (uint32_t i = 0; i < o->mesh->n_parts; i++) {
         const struct mesh_part *p = &o->mesh->part[i];
-        mesh_put_line(file->file, "newmtl ", p->name);
+        put_material(file->file, "newmtl ", p->name);
         fputs("Ka 0 0 0\nKd 1 1 1\nKs 0 0 0\nd 1\nillum 1\n", file->file);
         if (p->texture != NULL) mesh_put_line(file->file, "map_Kd ", p->texture);
     }
@@ -112,7 +121,7 @@ static int put_parts(const struct obj *o, int materials, struct sh_err *err)
         const struct mesh_part *p = &o->mesh->part[i];
         mesh_put_line(o->file->file, "o ", p->name);
         rc = put_rows(o, put_vertex, vertex, p->n_vertices, o->work, err);
-        if (materials) mesh_put_line(o->file->file, "usemtl ", p->name);
+        if (materials) put_material(o->file->file, "usemtl ", p->name);
         if (rc == SH_OK && o->mesh->face != NULL) rc = put_rows(o, put_face, face, p->n_faces, o->work, err);
         if (rc == SH_OK && o->mesh->face == NULL) rc = put_rows(o, put_point, vertex, p->n_vertices, NULL, err);
         vertex += p->n_vertices;

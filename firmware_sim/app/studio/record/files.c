@@ -109,7 +109,8 @@ int record_files_check_emitter(const struct record_files *files, enum emitter_ki
         if (files->file[i].ops->track.grid)
             return sh_fail(
                 err, SH_EINPUT,
-                "record: -o %s: a grid has rows and columns, but this head fires %s; allowed are .ply .las .e57 .shs",
+                "record: -o %s: a grid has rows and columns, but this head fires %s; allowed are .ply .las .e57 "
+                ".poses.csv .waves.csv .shs .pcapng",
                 files->file[i].path, kind == EMITTER_BEAMS ? "beams in turn" : "along a list");
     return SH_OK;
 }

@@ -242,7 +242,9 @@ static int check_meshes(const struct record_job *r, const struct config *cfg, st
     const enum emitter_kind kind = cfg->profile.emitter.kind;
     const int on_earth = cfg->output.layout == LINE_GEO && cfg->output.crs != GEOREF_LOCAL;
     const int moves = config_head_moves(&cfg->platform);
-    const int one_line = kind == EMITTER_PLANAR || (kind == EMITTER_LINE && cfg->head.settings.pan_udeg_s == 0) ||
+    const struct head_settings *s = &cfg->head.settings;
+    const int pans = s->pan_udeg_s > 0 && s->pan_stop_udeg > s->pan_start_udeg; /* else a scan is one line */
+    const int one_line = kind == EMITTER_PLANAR || (kind == EMITTER_LINE && !pans) ||
                          (kind == EMITTER_SPHERE && cfg->profile.emitter.rings <= 1);
     int rc = on_earth ? record_files_check_floats(&r->files, err) : SH_OK;
     if (rc == SH_OK && on_earth && moves)
@@ -254,7 +256,7 @@ static int check_meshes(const struct record_job *r, const struct config *cfg, st
         rc = record_files_refuse_meshes(&r->files,
                                         "needs a surface, but this head scans a single line: it neither pans nor "
                                         "moves, and has one ring; allowed are .ply (without --mesh and --sparse) .las "
-                                        ".ptx .e57 .shs",
+                                        ".ptx .e57 .poses.csv .waves.csv .shs .pcapng",
                                         err);
     return rc == SH_OK ? record_files_check_emitter(&r->files, kind, err) : rc;
 }

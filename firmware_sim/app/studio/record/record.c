@@ -265,7 +265,8 @@ static int record_run(int argc, char **argv)
     if (!is_stream(r.job.source))
         return app_usage(
             &app_record,
-            "SOURCE %s: allowed usb, usb:VID:PID:SERIAL, tty:PATH, tcp:HOST:PORT, FILE.shs, FILE.pcapng, CONFIG.yaml",
+            "SOURCE %s: allowed usb, usb:VID:PID:SERIAL, tty:PATH, tcp:HOST:PORT, fd:N, FILE.shs, FILE.pcapng, "
+            "CONFIG.yaml",
             r.job.source);
     if (r.in.sets.n != 0) return app_usage(&app_record, "--set, --crs and --threads need a CONFIG as SOURCE");
     if (r.in.scenario != NULL || r.job.truth != NULL || r.job.surfaces != NULL)
@@ -278,7 +279,7 @@ static int record_run(int argc, char **argv)
 /* clang-format off */
 static const struct app_option OPTIONS[] = {
     {APP_CALL, "output", "FILE", .letter = 'o', .apply = take_file, .file = APP_WRITES,
-     .help = "file to write; may be repeated"},
+     .help = "file to write; may be repeated, for up to 8 files"},
     {APP_ALONE, "repair", "FILE", .apply = take_repair, .file = APP_READS,
      .help = "instead of recording: complete the file that a killed recorder or a full disk left (FILE.part), in "
              "place, and print how much was kept; a complete file is only checked. May be repeated; without SOURCE "
@@ -289,7 +290,8 @@ static const struct app_option OPTIONS[] = {
      .help = "frames per scan; 0: without end"},
     {APP_NUMBER, "duration", "S", .min = 0.001, .max = 1e8, .at = AT(job.recording.duration_s),
      .help = "end each scan after S seconds of device time: with a CONFIG exact to a pulse, with a head on a wire as "
-             "soon as it carries out the command. With --listen the recording ends then"},
+             "soon as it carries out the command. With --listen the recording ends S seconds after a scan began; it "
+             "waits for that scan without end"},
     {APP_FLAG, "split", NULL, .at = AT(job.files.split),
      .help = "write each scan to its own files: NAME-1.las, NAME-2.las, ..., in the order of scans"},
     {APP_FLAG, "each", NULL, .at = AT(job.each), .help = "like --split, in addition to the files of all scans"},
@@ -369,6 +371,7 @@ static const char HELP_NOTES[] =
     "                       usb:vid:pid:serial\n"
     "  tty:/dev/...         a serial port\n"
     "  tcp:host:port        a socket\n"
+    "  fd:N                 an open descriptor, as of a serial port, a socket or a FIFO\n"
     "  udp:address:port     only with --raw: datagrams of any protocol, to a .pcapng\n"
     "  FILE.shs             a raw stream; FILE.pcapng: its frames as packets\n"
     "\n"
@@ -393,6 +396,7 @@ static const char HELP_NOTES[] =
     "Exit status 1: the recording is not complete. One of these happened:\n"
     "\n"
     "  The stream ended before the scan did.\n"
+    "  The file of a stream (.shs, .pcapng) begins within a scan.\n"
     "  Ctrl-C came before the end of a scan that has an end (not with --listen).\n"
     "  Frames or pulses were lost on the way.\n"
     "  The head was disconnected within a scan.\n"

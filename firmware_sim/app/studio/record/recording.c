@@ -58,10 +58,12 @@ static int set(struct recording *r, const char *header, long value, struct sh_er
 static void count_points(struct recording *r, const struct scanhead_frame *frame)
 {
     uint32_t empty, with_reflectance;
+    struct scanhead_info info;
     native_count_points(frame->payload, frame->n_points, &empty, &with_reflectance);
     r->result->with_reflectance += with_reflectance;
     r->result->empty += empty;
     r->result->points += frame->n_points - empty;
+    if (scanhead_get_info(r->sh, &info) != SCANHEAD_OK) r->result->unplaced += frame->n_points;
 }
 
 /* The head stopped or failed while the mirror was still spinning up. There is no scan, so no SCAN_END
@@ -414,6 +416,7 @@ int recording_run(struct scanhead *sh, const struct recording_options *options, 
                   struct sh_err *err)
 {
     memset(result, 0, sizeof *result);
+    result->is_file = options->source_bytes > 0;
     const int64_t start_ns = clock_now_ns();
     struct recording r = {.sh = sh, .o = options, .result = result, .next_report_ns = start_ns + 1000000000};
     if (options->hash) scanhead_hash_start(sh);

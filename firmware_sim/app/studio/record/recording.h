@@ -49,6 +49,8 @@ struct recording_result {
     char missing[128];              /* what was asked for and left out because of `interrupted`; empty: nothing */
     double wall_s;                  /* how long the recording took */
     struct scanhead_stats stream;   /* as the client counts */
+    int is_file;                    /* the stream was read from a file */
+    uint64_t unplaced;              /* points and empty shots that came before the descriptor and the anchor */
     char sha256[65];                /* of the stream; empty where none was kept */
     uint64_t replugs, broken_scans; /* how often the head was away and came back; scans in which it was away */
     uint64_t bus_resets;            /* how often its USB bus was reset, which ended the session */
@@ -66,7 +68,8 @@ void recording_put(struct json *json, const void *ctx);
 /* 1: frames came twice or too late, or the head started again; the text says how often. 0: none of these. Frames that
  * came too late, or a second time, are in no file. */
 int recording_describe_order(const struct recording_result *result, char *text, size_t len);
-/* SH_OK, or what is missing: frames, pulses, parts of scans. Echoes that the head left out do not count. */
+/* SH_OK, or what is missing: frames, pulses, parts of scans. Echoes that the head left out do not count. Pulses from
+ * before the recording began count only in a file, since a recorder may join a live stream within a scan. */
 int recording_check_complete(const struct recording_result *result, struct sh_err *err);
 
 #endif

@@ -94,6 +94,17 @@ int recording_describe_order(const struct recording_result *result, char *text, 
     return text[0] != '\0';
 }
 
+/* A file may lack its beginning, and no gap in the sequence says so. */
+static int check_beginning(const struct recording_result *result, struct sh_err *err)
+{
+    if (!result->is_file || (result->counts.missing == 0 && result->unplaced == 0)) return SH_OK;
+    return sh_fail(
+        err, SH_EIO,
+        "the recording is not complete: the file begins within a scan; of the pulses that the head sent %llu are "
+        "missing, and %llu points came before the descriptor and the anchor of their scan",
+        (unsigned long long)result->counts.missing, (unsigned long long)result->unplaced);
+}
+
 int recording_check_complete(const struct recording_result *result, struct sh_err *err)
 {
     const struct scanhead_stats *s = &result->stream;
@@ -107,7 +118,7 @@ int recording_check_complete(const struct recording_result *result, struct sh_er
             err, SH_ELOST, "the recording is not complete: %s within %llu scans; %llu frames known to be lost",
             result->replugs == 0 && result->bus_resets != 0 ? "the USB bus was reset" : "the head was disconnected",
             (unsigned long long)result->broken_scans, lost);
-    if (lost == 0 && pulses == 0) return SH_OK;
+    if (lost == 0 && pulses == 0) return check_beginning(result, err);
     return sh_fail(
         err, SH_EIO,
         "the recording is not complete: %llu frames lost to this reader, %llu pulses by the head; of the pulses that "

@@ -1,0 +1,91 @@
+/* SPDX-License-Identifier: MIT */
+/* Names of files that a mesh refers to: as URIs in .gltf, as the rest of a line in .obj. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/studio/mesh/inside.h"
+#include "core/utf8.h"
+
+static int is_utf8(const char *text)
+{
+    for (size_t left = strlen(text); left > 0;) {
+        const int n = utf8_len(text, left);
+        if (n <= 0) return 0;
+        text += n;
+        left -= (size_t)n;
+    }
+    return 1;
+}
+
+static int is_control(unsigned char c)
+{
+    return c < 0x20 || c == 0x7f;
+}
+
+static int has_control(const char *text)
+{
+    for (; *text != '\0'; text++)
+        if (is_control((unsigned char)*text)) return 1;
+    return 0;
+}
+
+static int ends_in(const char *name, const char *ending)
+{
+    const size_t n = strlen(name), end = strlen(ending);
+    return n >= end && strcmp(name + n - end, ending) == 0;
+}
+
+int mesh_check_name(const char *path, struct sh_err *err)
+{
+    const char *name = basename(path), *c = strpbrk(name, "%#?:\\");
+    if (ends_in(name, ".obj") && has_control(name))
+        return sh_fail(err, SH_EINPUT,
+                       "%s: a line of .obj names its other files; allowed are names without control characters", path);
+    if (!ends_in(name, ".gltf")) return SH_OK; /* .glb holds all */
+    if (!is_utf8(name))
+        return sh_fail(err, SH_EINPUT, "%s: .gltf is UTF-8, and so are the names of its files; allowed is such a name",
+                       path);
+    if (c == NULL) return SH_OK;
+    return sh_fail(err, SH_EINPUT,
+                   "%s: .gltf refers to its other files by URIs, where %c has a special meaning; allowed are names "
+                   "without %% # ? : \\",
+                   path, *c);
+}
+
+/* Whether a URI that may have letters of all languages (RFC 3987) can't have this character. */
+static int is_encoded(char c)
+{
+    return is_control((unsigned char)c) || strchr(" \"<>^`{|}", c) != NULL;
+}
+
+char *mesh_uri_of(const char *path)
+{
+    const char *name = basename(path);
+    char *uri = malloc(3 * strlen(path) + 1), *to = uri;
+    if (uri == NULL) return NULL;
+    to = mempcpy(to, path, (size_t)(name - path));
+    for (; *name != '\0'; name++) {
+        if (is_encoded(*name))
+            to += sprintf(to, "%%%02X", (unsigned char)*name);
+        else
+            *to++ = *name;
+    }
+    *to = '\0';
+    return uri;
+}
+
+void mesh_uri_undo(char *path)
+{
+    char *name = basename(path), *to = name;
+    for (; *name != '\0'; name++) {
+        unsigned c;
+        if (*name == '%' && sscanf(name + 1, "%2X", &c) == 1) {
+            *to++ = (char)c;
+            name += 2;
+        } else {
+            *to++ = *name;
+        }
+    }
+    *to = '\0';
+}
