@@ -196,7 +196,7 @@ static int check_head(const struct native_descriptor *d, const struct native_emi
 
 const struct protocol_ops protocol_cola = {
     .name = "cola",
-    .needs = PROTOCOL_NEEDS_POLAR | PROTOCOL_SCANS_ON,
+    .needs = PROTOCOL_NEEDS_POLAR,
     .emitters = 1u << NATIVE_EMIT_PLANAR,
     .max_unit = COLA_MAX_UNIT,
     .content = cola_content,

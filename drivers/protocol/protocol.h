@@ -30,13 +30,12 @@ enum protocol_id {
     PROTOCOL_N
 };
 
-/* Requirements of a protocol on the stream, and on the head's scans. */
+/* Requirements of a protocol on the stream. */
 enum protocol_needs {
     PROTOCOL_NEEDS_POLAR = 1 << 0, /* output.layout: polar */
     PROTOCOL_NEEDS_TIME = 1 << 1,  /* time.epoch is not none */
     PROTOCOL_NEEDS_PLACE = 1 << 2, /* each station has a place on the Earth */
     PROTOCOL_NEEDS_LAST = 1 << 3,  /* beam.echoes is not first */
-    PROTOCOL_SCANS_ON = 1 << 4,    /* its device scans until it is stopped: head.frames is 0 where it is not given */
 };
 
 /* States of the pulses per second that the head's clock follows. The values are those of a VLP-16. */

@@ -153,7 +153,7 @@ static int check_head(const struct native_descriptor *d, const struct native_emi
 
 const struct protocol_ops protocol_scip = {
     .name = "scip",
-    .needs = PROTOCOL_NEEDS_POLAR | PROTOCOL_SCANS_ON,
+    .needs = PROTOCOL_NEEDS_POLAR,
     .emitters = 1u << NATIVE_EMIT_PLANAR,
     .max_unit = SCIP_MAX_UNIT,
     .content = scip_content,

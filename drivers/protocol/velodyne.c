@@ -331,7 +331,7 @@ static void mark_entries(const uint8_t *packet, size_t len, uint8_t *mask)
 
 const struct protocol_ops protocol_velodyne = {
     .name = "velodyne",
-    .needs = PROTOCOL_NEEDS_POLAR | PROTOCOL_NEEDS_LAST | PROTOCOL_SCANS_ON,
+    .needs = PROTOCOL_NEEDS_POLAR | PROTOCOL_NEEDS_LAST,
     .emitters = 1u << NATIVE_EMIT_BEAMS,
     .n_beams = VELODYNE_BEAMS,
     .max_unit = VELODYNE_DATA_LEN,

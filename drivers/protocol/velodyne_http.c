@@ -186,7 +186,6 @@ static int owes(const void *protocol)
 
 const struct protocol_ops protocol_velodyne_http = {
     .name = "velodyne-http",
-    .needs = PROTOCOL_SCANS_ON,
     .emitters = 1u << NATIVE_EMIT_BEAMS,
     .n_beams = VELODYNE_BEAMS,
     .max_unit = MAX_ANSWER,

@@ -102,8 +102,7 @@ struct config_head {
     struct head_settings settings;
     char serial[32], name[32];
     char settings_file[CONFIG_PATH_LEN];
-    int start;    /* scan when booted; run and soak use it, recordings do not */
-    int scans_on; /* head.frames is not given, and a link speaks as a device that scans on: `run` has no last frame */
+    int start;        /* scan when booted; run and soak use it, recordings do not */
     double motor_ppm; /* error of a rotor's speed (`emitter: beams`) where nothing holds the rotor's phase */
     enum detect_ambiguity ambiguity;
     uint32_t mta_zones;

@@ -84,9 +84,7 @@ static const struct cfg_key config_keys[] = {
      .allowed = "range_min_m to range_max_m of the head profile, in m",
      .help = "Pulses that hit something farther are shots without echo. The descriptor on the wire has these limits."},
     {"head.frames", SETTING(frames), CFG_COUNT, NULL, "1", 0, HEAD_MAX_FRAMES,
-     .help = "Frames (pan sweeps, or turns of a head without a pan) per scan; 0: until stopped. With a link of "
-             "protocol scip, cola, velodyne or velodyne-http, `scanhead run` scans until stopped where this key is "
-             "not given."},
+     .help = "Frames (pan sweeps, or turns of a head without a pan) per scan; 0: until stopped."},
     {"head.station", SETTING(station), CFG_COUNT, NULL, "1", 1, CONFIG_MAX_STOPS,
      .help = "Station where the head stands, counted from 1."},
 

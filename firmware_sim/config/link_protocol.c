@@ -149,7 +149,6 @@ void cfg_check_link_protocols(struct cfg_reader *rd, struct config *cfg)
         check_stream(rd, cfg, i, ops_of(&cfg->link[i]));
         check_head(rd, cfg, i, ops_of(&cfg->link[i]));
     }
-    cfg->head.scans_on = !cfg_is_given(rd, "head.frames") && cfg_link_that_needs(cfg, PROTOCOL_SCANS_ON) >= 0;
 }
 
 int config_speaks(const struct config *cfg, int protocol)

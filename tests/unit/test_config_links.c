@@ -51,29 +51,6 @@ static void a_link_has_as_many_clients_as_its_device(void **state)
     assert_int_equal(cfg->link[2].max_sessions, 4);
 }
 
-/* A device of these protocols scans until it is stopped. A number that is given counts. */
-static void a_device_scans_on(void **state)
-{
-    (void)state;
-    static const struct {
-        const char *head, *link;
-        int scans_on;
-    } rows[] = {
-        {"hokuyo-urg-04lx", "{type: tcp, protocol: scip}", 1},
-        {"hokuyo-urg-04lx", "{type: tcp}", 0},
-        {"sick-tim781", "{type: tcp}, {type: usb, protocol: cola}", 1},
-        {"velodyne-vlp16", "{type: udp, port: 1, protocol: velodyne}", 1},
-        {"velodyne-vlp16", "{type: tcp, protocol: velodyne-http}", 1},
-        {"velodyne-vlp16", "{type: 'null', protocol: velodyne-position}", 0},
-        {"hokuyo-urg-04lx, frames: 1", "{type: tcp, protocol: scip}", 0},
-    };
-    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
-        load_link(rows[i].head, rows[i].link);
-        assert_int_equal(cfg->head.scans_on, rows[i].scans_on);
-        assert_int_equal(cfg->head.settings.frames, 1); /* that of a recording */
-    }
-}
-
 static void a_usb_link_is_the_device_of_its_protocol(void **state)
 {
     (void)state;
@@ -172,7 +149,6 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(packets_come_from_the_devices_port),
         cmocka_unit_test(a_link_has_as_many_clients_as_its_device),
-        cmocka_unit_test(a_device_scans_on),
         cmocka_unit_test(a_usb_link_is_the_device_of_its_protocol),
         cmocka_unit_test(a_serial_is_told_from_others),
         cmocka_unit_test(a_long_path_is_cut_at_its_beginning),

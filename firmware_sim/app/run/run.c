@@ -142,8 +142,7 @@ static int run_head(struct config *cfg, void *ctx, struct sh_err *err)
     if (rc == SH_OK) rc = site_open_sights(site, 0, site->n_stations, &app_report_stderr, err);
     /* The plan above is made for head.frames of the configuration, and only now the scan gets no end. So a journal of
      * this run gives the same plan and the same stream when it is replayed without --start. */
-    const int lasts = o->device.start && o->device.duration_s > 0.0 && !o->frames_given;
-    if (lasts || cfg->head.scans_on) cfg->head.settings.frames = 0;
+    if (o->device.start && o->device.duration_s > 0.0 && !o->frames_given) cfg->head.settings.frames = 0;
     if (rc == SH_OK) rc = site_warn_rate(site, &app_report_stderr, err);
     if (rc == SH_OK) rc = open_settings(o, cfg, err);
     if (rc == SH_OK) rc = device_create(site, &o->device, &device, err);
