@@ -23,7 +23,18 @@ static void take(struct scan_count *count, const struct step *s)
     static uint8_t frame[1024] = {[1] = NATIVE_POINTS};
     const struct native_descriptor d = {.scan = s->scan, .frames = 1};
     const struct native_event e = {0}, start = {.code = NATIVE_EV_SCAN_START, .a = s->scan, .b = (uint64_t)s->t_ns};
-    const struct line_block block = {.t0_ns = 700};
+    static uint32_t word[1];
+    static int16_t refl_cdb[1];
+    static uint16_t label[1];
+    static uint8_t echo[1];
+    const struct line_block block = {.t0_ns = 700,
+                                     .a = word,
+                                     .b = word,
+                                     .c = word,
+                                     .dt_ns = word,
+                                     .refl_cdb = refl_cdb,
+                                     .label = label,
+                                     .echo = echo};
     if (s->what == DESCRIPTOR || s->what == REPEATED)
         assert_true(
             native_encode_descriptor(frame, sizeof frame, &d, s->t_ns, s->what == REPEATED ? NATIVE_REPEAT : 0) > 0);

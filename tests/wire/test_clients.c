@@ -169,7 +169,8 @@ static void babbling_client(struct wire *wire, const char *link)
     struct scanhead *watch = client_open(head_endpoint(&head, "tcp"));
     start_scan(watch);
 
-    struct scanhead *sh = client_from_fd(raw_open(&head, link));
+    int fd = raw_open(&head, link);
+    struct scanhead *sh = client_from_fd(fd);
     raw_expect(sh, "BEAM:ME:UP", "ERR -113,\"Undefined header");
     raw_expect(sh, "BEAM:ME:UP?", "ERR -113");
     raw_expect(sh, "HEAD:PRR ten", "ERR -104");
@@ -182,10 +183,12 @@ static void babbling_client(struct wire *wire, const char *link)
          *code != NULL; code++)
         assert_int_equal(atoi(client_ask(watch, "SYST:ERR?")), atoi(*code));
 
-    /* A line of 1000 characters is refused whole. The line after it is accepted. */
-    char line[1001];
-    memset(line, 'A', 1000);
-    line[1000] = '\0';
+    /* A line of 1000 characters is refused whole. The line after it is accepted. The client takes lines of up to 256. */
+    char line[257], before[744];
+    memset(before, 'A', sizeof before);
+    memset(line, 'A', 256);
+    line[256] = '\0';
+    raw_send(fd, before, sizeof before);
     raw_expect(sh, line, "ERR -363,\"Input buffer overrun");
     raw_expect(sh, "*OPC?", "1");
     expect_error(watch, -363, NONE);
@@ -193,7 +196,7 @@ static void babbling_client(struct wire *wire, const char *link)
     expect_error(watch, 101, NONE);
 
     /* Sends bytes of all values and leaves without a line's end. The bytes give fewer errors than the queue holds. */
-    int fd = raw_open(&head, link);
+    fd = raw_open(&head, link);
     unsigned char garbage[2500];
     uint32_t x = 12345;
     for (size_t i = 0; i < sizeof garbage; i++) {
