@@ -136,6 +136,7 @@ struct protocol_identity {
     } geometry[PROTOCOL_MAX_GEOMETRIES];
     uint32_t n_geometries;
     int64_t spin_up_ns;               /* from SCAN:STARt to the mirror's speed; 0: a recording */
+    int64_t queue_ns;                 /* how far a session may be behind the head before it loses frames */
     const struct cola_fields *fields; /* monitored fields and inputs of the configuration; NULL: none */
 };
 

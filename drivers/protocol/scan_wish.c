@@ -19,14 +19,14 @@ void scan_wish_start(struct scan_wish *wish, int64_t t_ns)
 }
 
 /* A scan that begins within a turn has its first whole turn after two turns at most. Before that the head spins up,
- * from the tick that was released when it was started: the session may be at an earlier one. */
+ * from the tick that was released when it was started: the session may be at an earlier one, by as much as frames wait
+ * for it. */
 int scan_wish_is_starting(const struct scan_wish *wish, const struct planar_scan *scan, int64_t now_ns)
 {
-    static const int64_t BEHIND_NS = 100000000;
     static const uint64_t NS_UHZ = UINT64_C(1000000000000000);
     const uint64_t lines_uhz = scan->head.lines_uhz;
-    const int64_t wait_ns =
-        BEHIND_NS + wish->identity->spin_up_ns + (lines_uhz != 0 ? (int64_t)(2 * NS_UHZ / lines_uhz) : 0);
+    const int64_t wait_ns = wish->identity->queue_ns + wish->identity->spin_up_ns +
+                            (lines_uhz != 0 ? (int64_t)(2 * NS_UHZ / lines_uhz) : 0);
     if (wish->start_ns == INT64_MAX || native_since_ns(now_ns, wish->start_ns) >= wait_ns) return 0;
     return scan->whole == NULL || scan->whole->scan_came_ns < wish->start_ns;
 }

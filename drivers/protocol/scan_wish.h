@@ -17,7 +17,7 @@ struct scan_wish {
     int lasts;
     int64_t t_ns;     /* the session's device time when the wish was made, or when the head was last started for it */
     int64_t start_ns; /* the session's device time of its last SCAN:STARt; INT64_MAX: there was none */
-    const struct protocol_identity *identity; /* how long the head spins up; outlives the wish */
+    const struct protocol_identity *identity; /* how long the head spins up, and frames wait; outlives the wish */
 };
 
 /* At power-up: there is no wish, and the session has not started the head. */

@@ -25,7 +25,7 @@ struct pose_file {
     struct recorder base;
     /* of a head that moves */
     uint32_t n_scans;
-    int is_due;                /* the event SCAN_START came, and no pose after it */
+    int is_due;                /* SCAN_START of another scan than that of the last points came, and no pose after it */
     const struct scanhead *sh; /* of the present scan */
     uint32_t scan, station;    /* of the present scan, as its head numbers them */
     int64_t last_ns;           /* written last */
@@ -136,7 +136,8 @@ static int pose_file_frame(void *rec, struct scanhead *sh, const struct scanhead
 {
     struct pose_file *file = rec;
     if (frame->type == SCANHEAD_POSES) return put_poses(file, sh, frame, err);
-    file->is_due |= frame->type == SCANHEAD_EVENT && frame->event == SCANHEAD_EV_SCAN_START;
+    file->is_due |= frame->type == SCANHEAD_EVENT && frame->event == SCANHEAD_EV_SCAN_START &&
+                    !track_is_late_start(&file->base.track, frame);
     return track_frame(&file->base.track, sh, frame, err);
 }
 

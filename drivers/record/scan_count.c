@@ -41,6 +41,7 @@ void scan_count_frame(struct scan_count *count, const uint8_t *frame)
     }
     if (header.type == NATIVE_DESCRIPTOR && native_decode_descriptor(payload, header.length, &d) == 0) {
         begins = scan_count_begins(count, &d, &header);
+        if (begins) count->has_points = 0;
         count->number = d.scan;
         count->t_ns = header.t_ns;
     }

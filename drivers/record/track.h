@@ -134,6 +134,9 @@ struct track {
     struct track_state state;
 };
 
+/* Returns whether a SCAN_START is of the scan of the last points, and comes after them. Nothing begins with it. One
+ * that is not later than these points is of another scan with the same start: a recording may be there twice. */
+int track_is_late_start(const struct track *track, const struct scanhead_frame *start);
 /* Takes a new frame of the stream. SH_EFORMAT if one file can't hold what the stream goes on with: another CRS or
  * kind of heights; a head that begins or ceases to move, to stop on a trajectory, or to send (wanted) attributes,
  * deviations, colours or waveforms; a station number above 65535; a line of more than 2^32 pulses. SH_EFORMAT also if

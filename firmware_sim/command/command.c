@@ -35,7 +35,6 @@ int command_fail(struct command_call *call, int number, const char *fmt, ...)
     va_start(ap, fmt);
     vsnprintf(text, sizeof text, fmt, ap);
     va_end(ap);
-    sh_keep_line(text); /* a command may have any bytes */
     command_queue_push(&call->dev->queue, number, text);
     /* Compose the reply anew: in a full queue the entry is -350, but the reply must still name the error. */
     command_error_compose(entry, sizeof entry, number, text);

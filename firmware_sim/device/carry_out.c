@@ -97,6 +97,19 @@ static const char *why_dead(const struct device *device, uint64_t released)
     return device_is_dead(device, released) ? "the head has no power" : NULL;
 }
 
+/* Keeps what a command does beside changes, on a copy of the device, until power goes: to the error queue, and to
+ * control, which it may give back. */
+static void keep_beside_changes(struct device *device, const struct command_device *copy, uint32_t session,
+                                const struct command_result *result)
+{
+    device->cmd.queue = copy->queue;
+    if (result->error != 0)
+        device_push_error(&device->events, session, result->error, command_error_text(result->error));
+    if (result->effect != COMMAND_RELEASE) return;
+    device->cmd.control = copy->control;
+    carry_out(device, result, device->next_tick);
+}
+
 /* Answers a command while power is gone, or is about to go since HEAD:REBoot has been answered. The old sessions are
  * cut off when the tick without power is released. Meanwhile native sessions get no further answer; others have to
  * answer, and learn why a change is refused. In the pace `step` links are back at once, so that new sessions can come
@@ -108,12 +121,14 @@ static void do_dead(struct device *device, uint32_t session, const char *line, c
     if (cmd == NULL) return;
     *cmd = device->cmd;
     cmd->faults = &fault_desk_queries; /* the copy must not change the device's own faults */
+    if (!device->power.reboots) memset(&cmd->queue, 0, sizeof cmd->queue); /* without power it holds nothing */
     command_execute(cmd, session, line, out);
     const int is_act = out->changes || out->effect == COMMAND_TAKE;
     if (is_act && out->effect != COMMAND_STEP) {
         memset(out, 0, sizeof *out);
         command_refuse(cmd, CMD_E_SETTINGS, why, out);
     }
+    if (device->power.reboots) keep_beside_changes(device, cmd, session, out);
     free(cmd);
 }
 

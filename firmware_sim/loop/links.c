@@ -75,6 +75,7 @@ static void identify(struct links *links, const struct config *cfg)
         id->geometry[i] = (struct protocol_geometry){cfg->profile.arrangement.geometry[i].lines_uhz,
                                                      cfg->profile.arrangement.geometry[i].steps_per_turn};
     id->spin_up_ns = llround(1e9 * cfg->profile.spin_up_s);
+    id->queue_ns = llround(1e6 * cfg->loop.queue_ms);
     config_fill_fields(cfg, &links->fields);
     id->fields = cfg->n_fields + cfg->n_inputs != 0 ? &links->fields : NULL; /* pump_protocol.c: look_back */
     for (uint32_t i = cfg->n_links; i-- > 0;) {

@@ -147,6 +147,7 @@ void protocol_rig_open(struct protocol_rig *rig, enum protocol_id id, const char
     snprintf(rig->identity.serial, sizeof rig->identity.serial, "17210001");
     snprintf(rig->identity.firmware, sizeof rig->identity.firmware, "1.2.3");
     snprintf(rig->identity.name, sizeof rig->identity.name, "rig");
+    rig->identity.queue_ns = 100000000;
     rig->spec = (struct protocol_spec){
         .identity = &rig->identity,
         .host = {rig, keep_unit, answer, fix, count, hang_up, next_fix_ns, pps, date_ns, store, NULL},

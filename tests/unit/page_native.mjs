@@ -315,6 +315,15 @@ test('another sequence: its points have no place before its own descriptor and a
   const repeated = Object.assign(Buffer.from(d.bytes), {3: REPEAT}); // the descriptor alone says the same scan
   const again = readAll([...front, renumbered({bytes: repeated}, 7), renumbered(p, 8, 1000n)]);
   equal(again.decoder.stats.unplaced_shots, 3, 'after a repeated descriptor without its anchor');
+  // A descriptor for this reader alone has named the scan of the sequence that follows: its pulses and start are other ones.
+  const told = signed(Object.assign(Buffer.from(d.bytes), {3: REPEAT | LOCAL}));
+  const start = renumbered(samples[at(6)], 7);
+  start.writeUInt32LE(2, 28);
+  start.writeBigUInt64LE(BigInt(d.bytes.readUInt32LE(28 + 260)), 28 + 8);
+  start.writeBigInt64LE(77n, 28 + 16);
+  for (const pieces of [[renumbered(p, 7, -1n)], [signed(start), renumbered(p, 8, 1000n)]]) {
+    equal(readAll([...front, told, ...pieces]).decoder.stats.unplaced_shots, 0, 'of a scan that was told to this reader alone');
+  }
 });
 
 test('a SCAN_START of the same number: points have no place before the new anchor, if the scan has another start', () => {

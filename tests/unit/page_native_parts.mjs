@@ -106,14 +106,14 @@ test('the time of a command counts once it is the next to be answered', async ()
 
 // ---- losses
 
-// Returns what Losses says of these. Each points frame has 100 shots.
+// Returns what Losses says of these. Each points frame has 100 shots, or as many as stand after it.
 function lossesOf(...things) {
   const said = [], losses = new Losses((name, d) => said.push(name === 'scan'
     ? `scan ${d.scan} ${d.fired} ${d.cast} ${d.lost} ${d.received} ${d.missing}` : `${d.by} ${d.frames} ${d.pulses}`));
   let shots = 0;
-  for (const [name, value, lost_frames] of things) {
-    losses[name]({...value, shots}, lost_frames);
-    if (name === 'points') shots += 100;
+  for (const [name, value, n] of things) { // n: of points, or the lost frames before telemetry
+    losses[name]({shots, ...value}, n);
+    if (name === 'points') shots += n ?? 100;
   }
   return said.join('; ');
 }
@@ -141,6 +141,14 @@ test('where a scan ends, with SCAN_END and without, and what is missing of it', 
     equal(lossesOf(started(2500000000n), d(1), begun, telemetry(4, 1), started(at_ns), d(1), points, telemetry(5, 1), end),
       `scan 1 null null null 100 null; ${whole}`, 'another start: another scan of the same number');
   }
+  // Each scan has 120 pulses, and all came. The first one has ended, or the page joined it after 5000 pulses.
+  const all = (shots) => Array.from({length: shots / 20}, () => ['points', {scan: 1, began_s: 2.5}, 20]), last = ['telemetry',
+    {state: 5, scan: 1, scan_fired: 120, scan_cast: 120, scan_lost: 0}], over = event('SCAN_END', {scan: 1, fired: 120, lost: 0});
+  const past = ['past', {scan: 1, shots: 5000}], none = 'scan 1 120 120 0 120 0';
+  equal(lossesOf(started(2500000000n), d(1), ...all(120), last, over, started(60000000000n), d(1), ...all(120), last, over),
+    `${none}; ${none}`, 'a scan of the same number after the end of one');
+  equal(lossesOf(d(1), past, ...all(100), started(60000000000n), d(1), ...all(120), last, over),
+    `scan 1 null null null 5100 null; ${none}`, 'pulses that the head had kept are of the scan before');
   // The final counts that were lost come with the next telemetry of the same scan: 120 - 7 - 100 pulses are missing.
   for (const [state, scan, missing] of [[2, 1, 13], [5, 1, 13], [3, 1, 13], [4, 1, 0], [2, 2, 0]]) {
     const late = new Losses(() => {});

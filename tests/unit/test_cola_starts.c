@@ -154,6 +154,23 @@ static void a_slow_mirror_is_started_once(void **state)
     }
 }
 
+/* Frames wait for the session for up to queue_ns, so that it may be that far behind the head. Two turns take 80 ms, so
+ * that the first whole turn may come that much later. Only after that the head is started again. */
+static void a_session_that_is_behind_starts_once(void **state)
+{
+    (void)state;
+    for (int64_t queue_ns = 200000000; queue_ns <= 1000000000; queue_ns += 800000000) {
+        cola_open_lms();
+        cola.identity.queue_ns = queue_ns;
+        cola_authorise();
+        cola_head_state("idle");
+        cola.ops->time(cola.protocol, 1000000000);
+        cola_expect("sEN LMDscandata 1", "sEA LMDscandata 1");
+        assert_int_equal(starts_until(1000000000, 1075000000 + queue_ns), 1);
+        assert_int_equal(starts_until(1080000000 + queue_ns, 1280000000 + queue_ns), 1);
+    }
+}
+
 /* The session has started the scan that another session stops, but had its turns before it asked for scans again. */
 static void a_scan_of_its_own_from_before_is_not_enough(void **state)
 {
@@ -204,6 +221,7 @@ int main(void)
         CASE(a_scan_that_ends_by_itself_is_enough),
         CASE(a_scan_of_its_own_may_be_over_when_it_comes),
         CASE(a_slow_mirror_is_started_once),
+        CASE(a_session_that_is_behind_starts_once),
         CASE(a_scan_of_its_own_from_before_is_not_enough),
         CASE(a_later_scan_of_another_is_enough),
     };

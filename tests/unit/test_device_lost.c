@@ -118,6 +118,47 @@ static void refuses_changes_once_it_reboots(void **state)
     rig_close(rig);
 }
 
+/* Returns the answer, which may be an error. */
+static const char *answer(struct rig *rig, const char *line)
+{
+    static struct command_result result;
+    device_command(rig->device, 1, line, 290, &result);
+    return result.reply;
+}
+
+/* Commands that change no setting work until power goes: errors are queued and taken out, control is given back. */
+static void empties_its_queue_until_power_goes(void **state)
+{
+    (void)state;
+    struct rig *rig = rig_open(NULL, NULL, 0);
+    struct command_result result;
+    rig_go_to(rig, 300);
+    assert_string_equal(answer(rig, "SYST:CONT:TAKE"), "OK");
+    assert_string_equal(answer(rig, "HEAD:REBOOT"), "OK");
+    answer(rig, "HEAD:LINES 40");
+    answer(rig, "nonsense");
+    assert_string_equal(answer(rig, "SYST:ERR:COUN?"), "2");
+    assert_string_equal(answer(rig, "SYST:ERR?"), "-221,\"Settings conflict; the head reboots\"");
+    assert_memory_equal(answer(rig, "SYST:ERR?"), "-113,", 5);
+    assert_string_equal(answer(rig, "SYST:ERR?"), "0,\"No error\"");
+    answer(rig, "nonsense");
+    assert_string_equal(answer(rig, "*CLS"), "OK");
+    assert_string_equal(answer(rig, "SYST:ERR:COUN?"), "0");
+    assert_string_equal(answer(rig, "SYST:CONT:TAKE"), "ERR -221,\"Settings conflict; the head reboots\"");
+    assert_string_not_equal(answer(rig, "SYST:CONT?"), "0");
+    assert_string_equal(answer(rig, "SYST:CONT:REL"), "OK");
+    assert_string_equal(answer(rig, "SYST:CONT?"), "0");
+    assert_string_equal(answer(rig, "HEAD:LINES?"), "100");
+    /* Without power the queue holds nothing, so that a client that empties it comes to an end. */
+    assert_true(rig_claim(rig));
+    for (int i = 0; i < 2; i++) {
+        device_command_once(rig->device, 1, "SYST:ERR?", 290, &result);
+        assert_string_equal(result.reply, "0,\"No error\"");
+        device_command_once(rig->device, 1, "HEAD:LINES 40", 290, &result);
+    }
+    rig_close(rig);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -125,6 +166,7 @@ int main(void)
         cmocka_unit_test(a_lost_overrun_is_said_with_the_next),
         cmocka_unit_test(a_head_without_power_forgets_what_it_had_to_say),
         cmocka_unit_test(refuses_changes_once_it_reboots),
+        cmocka_unit_test(empties_its_queue_until_power_goes),
     };
     return cmocka_run_group_tests_name("device lost", tests, make_folder, remove_folder);
 }

@@ -156,6 +156,40 @@ static void test_alike_long_ago(void **state)
     }
 }
 
+/* A sequence whose scan a descriptor for this reader alone has named has pulses and a start of its own: neither lower
+ * pulses nor a late SCAN_START show another scan. */
+static void test_told_alone(void **state)
+{
+    (void)state;
+    const struct line_block block = make_block(3, 50);
+    const struct native_event e = {.code = NATIVE_EV_SCAN_START, .a = 1, .b = 77};
+    for (int starts = 0; starts <= 1; starts++) {
+        int head;
+        struct scanhead *sh = open_pair(&head);
+        struct scanhead_frame f;
+        struct scanhead_point point[3];
+        put_descriptor(head, 0, 1, 0);
+        expect_frame(sh, SCANHEAD_DESCRIPTOR, &f);
+        put_anchor(head, 0);
+        expect_frame(sh, SCANHEAD_ANCHOR, &f);
+        put_points(head, 3, 100);
+        expect_frame(sh, SCANHEAD_POINTS, &f);
+        put_descriptor(head, 0, 1, NATIVE_LOCAL | NATIVE_REPEAT);
+        expect_frame(sh, SCANHEAD_DESCRIPTOR, &f);
+        size_t len = native_encode_event(out, sizeof out, &e, 500, 0);
+        native_finish_frame(out, 0);
+        if (starts) put_all(head, out, len);
+        if (starts) expect_frame(sh, SCANHEAD_EVENT, &f);
+        len = native_encode_points(out, sizeof out, &block, 500);
+        native_finish_frame(out, (uint32_t)starts);
+        put_all(head, out, len);
+        expect_frame(sh, SCANHEAD_POINTS, &f);
+        assert_int_equal(scanhead_points(sh, &f, 0, point, 3), 3);
+        close(head);
+        scanhead_close(sh);
+    }
+}
+
 /* Numbers may begin anywhere: what came before the first one holds. */
 static void test_any_start(void **state)
 {
@@ -233,10 +267,10 @@ static void test_hash(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_stats),   cmocka_unit_test(test_version_and_types),
-        cmocka_unit_test(test_restart), cmocka_unit_test(test_alike_long_ago),
-        cmocka_unit_test(test_alike),   cmocka_unit_test(test_any_start),
-        cmocka_unit_test(test_hash),
+        cmocka_unit_test(test_stats),      cmocka_unit_test(test_version_and_types),
+        cmocka_unit_test(test_restart),    cmocka_unit_test(test_alike_long_ago),
+        cmocka_unit_test(test_told_alone), cmocka_unit_test(test_alike),
+        cmocka_unit_test(test_any_start),  cmocka_unit_test(test_hash),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

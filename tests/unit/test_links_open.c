@@ -78,6 +78,7 @@ static void protocols_know_the_head_and_its_data_link(void **state)
     strcpy(cfg->head.serial, "SN-7");
     strcpy(cfg->head.name, "gate");
     cfg->profile.spin_up_s = 0.3;
+    cfg->loop.queue_ms = 1500;
     cfg->profile.arrangement.n_geometries = 2;
     cfg->profile.arrangement.geometry[0].lines_uhz = 15000000;
     cfg->profile.arrangement.geometry[0].steps_per_turn = 1080;
@@ -104,7 +105,7 @@ static void protocols_know_the_head_and_its_data_link(void **state)
     assert_int_equal(id->n_geometries, 2);
     assert_true(id->geometry[0].lines_uhz == 15000000 && id->geometry[0].steps == 1080);
     assert_true(id->geometry[1].lines_uhz == 25000000 && id->geometry[1].steps == 720);
-    assert_true(id->spin_up_ns == 300000000);
+    assert_true(id->spin_up_ns == 300000000 && id->queue_ns == 1500000000);
     assert_null(id->fields);
     loop_free(loop);
     cfg->n_fields = cfg->n_inputs = 1;

@@ -118,6 +118,37 @@ static void test_other_settings(void **state)
     assert_int_equal(rig_count(at, "\n"), 4);
 }
 
+/* The SCAN_START of the scan at hand comes after its first points, at 40 ms: poses go on. Then the recording is there
+ * once more. */
+static void test_late_start(void **state)
+{
+    (void)state;
+    static uint8_t out[256];
+    const struct native_event e = {.code = NATIVE_EV_SCAN_START, .a = 1, .b = 7000000};
+    struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
+    a.moving = NATIVE_MOVING;
+    rig_begin();
+    rig_scan_t0_ns = 7000000;
+    for (int i = 0; i < 2; i++) {
+        if (i == 1) rig_put(out, native_encode_event(out, sizeof out, &e, 7000000, 0));
+        put_scan(0, 1, &a);
+        put_poses(0, 100, 5);
+        rig_points(0, 0, 0, &one, 1);
+        if (i == 0) rig_put(out, native_encode_event(out, sizeof out, &e, 40000000, 0));
+        put_poses(100, 200, 6);
+    }
+    const char *at = record();
+    for (int i = 1; i <= 2; i++) {
+        char rows[160];
+        snprintf(rows, sizeof rows,
+                 "\n%d,0.000000000,0,5,0,1,0,0,0,0,0\n%d,0.100000000,0,6,0,1,0,0,0,0,0\n"
+                 "%d,0.200000000,0,7,0,1,0,0,0,0,0\n",
+                 i, i, i);
+        assert_non_null(strstr(at, rows));
+    }
+    assert_int_equal(rig_count(at, "\n"), 1 + 2 * 3);
+}
+
 /* Two heads start again, so that each calls both of its scans 5. In the file they are 1 to 4, and no pose is left out.
  */
 static void test_same_numbers(void **state)
@@ -189,8 +220,9 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_stations),       cmocka_unit_test(test_stops),        cmocka_unit_test(test_moving),
-        cmocka_unit_test(test_other_settings), cmocka_unit_test(test_same_numbers), cmocka_unit_test(test_link),
+        cmocka_unit_test(test_stations),       cmocka_unit_test(test_stops),      cmocka_unit_test(test_moving),
+        cmocka_unit_test(test_other_settings), cmocka_unit_test(test_late_start), cmocka_unit_test(test_same_numbers),
+        cmocka_unit_test(test_link),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);
 }

@@ -73,6 +73,35 @@ static void files_of_each_scan(void **state)
     expect("0<13 keep0 ");
 }
 
+/* The SCAN_START of the scan at hand comes after its first points. One with another start begins another scan, and so
+ * does one with the same start that is not later than the points: a recording may be there twice. */
+static void a_late_start(void **state)
+{
+    (void)state;
+    static const struct {
+        uint64_t begin_ns;
+        int64_t t_ns;
+        int is_late;
+    } start[] = {{1000, 1500, 1}, {1001, 1500, 0}, {999, 1500, 0}, {1000, 1000, 0}};
+    for (size_t i = 0; i < sizeof start / sizeof *start; i++) {
+        const struct scanhead_frame first = {.type = SCANHEAD_POINTS, .seq = 1, .t_ns = 1200, .scan_t0_ns = 200};
+        const struct scanhead_frame event = {.type = SCANHEAD_EVENT,
+                                             .seq = 2,
+                                             .t_ns = start[i].t_ns,
+                                             .event = SCANHEAD_EV_SCAN_START,
+                                             .event_value = {1, start[i].begin_ns}};
+        make(NULL);
+        add("a.ply");
+        files.split = 1;
+        open_all();
+        assert_int_equal(record_files_frame(&files, NULL, &first, &err), SH_OK);
+        assert_int_equal(record_files_frame(&files, NULL, &event, &err), SH_OK);
+        expect(start[i].is_late ? "open:a-1.ply 0<1 0<2 " : "open:a-1.ply 0<1 keep0 open:a-2.ply 0<2 ");
+        close_all(1, SH_OK);
+        trace[0] = '\0';
+    }
+}
+
 static void failures(void **state)
 {
     (void)state;
@@ -177,11 +206,9 @@ static void remains_of_scans(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup(a_list_of_files, make),
-        cmocka_unit_test_setup(frames_go_to_all, make),
-        cmocka_unit_test_setup(files_of_each_scan, make),
-        cmocka_unit_test_setup(failures, make),
-        cmocka_unit_test_setup(remains, make),
+        cmocka_unit_test_setup(a_list_of_files, make),    cmocka_unit_test_setup(frames_go_to_all, make),
+        cmocka_unit_test_setup(files_of_each_scan, make), cmocka_unit_test_setup(a_late_start, make),
+        cmocka_unit_test_setup(failures, make),           cmocka_unit_test_setup(remains, make),
         cmocka_unit_test_setup(remains_of_scans, make),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -79,6 +79,9 @@ static void test_frames(void **state)
                                          {START, 3, 100, 1},       {POINTS, 0, 100, 1},     {START, 3, 5000, 2},
                                          {DESCRIPTOR, 3, 6000, 2}, {POINTS, 0, 5000, 2},    {START, 4, 9000, 2},
                                          {DESCRIPTOR, 4, 9900, 3}},
+                             late[] = {{DESCRIPTOR, 1, 100, 1}, {POINTS, 0, 100, 1},  {DESCRIPTOR, 2, 4990, 2},
+                                       {START, 2, 5000, 2},     {POINTS, 0, 5000, 2}, {REPEATED, 3, 7990, 3},
+                                       {START, 3, 8000, 3},     {POINTS, 0, 8000, 3}},
                              idle[] = {{REPEATED, 7, 1, 0}, {REPEATED, 8, 1, 0}, {DESCRIPTOR, 8, 2, 1}};
 #define TELL(steps) tell(steps, (int)(sizeof(steps) / sizeof *(steps)))
     TELL(plain);
@@ -86,6 +89,7 @@ static void test_frames(void **state)
     TELL(lost);   /* the first descriptor of scan 2 was lost */
     TELL(again);  /* the head was started again: its time begins anew */
     TELL(number); /* a SCAN_START of the same number, late for the scan at hand, then with another start */
+    TELL(late);   /* a SCAN_START after the descriptor of its scan, and before the points */
     TELL(idle);   /* repeated ones between scans */
 }
 

@@ -323,23 +323,23 @@ static void test_restart(void **state)
 }
 
 /* After the first points come the scan's own SCAN_START once more, or late, and then points; or one with another start.
- * PROTOCOL.md: the anchor is void then. */
+ * PROTOCOL.md: the anchor is void then. The pulses before the scan's own one count, so that none is missing. */
 static void expect_after_start(int is_other)
 {
-    static const char *const fields[] = {"_ws.expert.message", NULL};
+    static const char *const fields[] = {S "missing_pulses", "_ws.expert.message", NULL};
     struct capture c = {0};
     size_t len;
     uint32_t seq = 0;
     uint8_t *bytes = (uint8_t *)wire_read(wire_path(wire, "polar.shs"), &len), *start = NULL, *at = bytes;
     capture_begin(&c);
     const uint32_t interface = capture_interface(&c, CAPTURE_USER0);
-    for (int more = 2; more > 0; at += native_frame_len(at)) {
-        assert_true(at < bytes + len);
+    for (int more = 2; at < bytes + len; at += native_frame_len(at)) {
         if (at[1] == NATIVE_EVENT && le_get32(at + NATIVE_HEADER_LEN) == NATIVE_EV_SCAN_START) start = at;
         if (at[1] == NATIVE_POINTS && --more == 0) {
             assert_non_null(start);
             start[NATIVE_HEADER_LEN + 18] ^= (uint8_t)is_other; /* 65536 ns earlier or later */
             le_put32(start + 8, seq++);
+            memcpy(start + 16, at + 16, 8); /* its device time is later than that of the first points */
             seal_frame(start);
             capture_packet(&c, interface, start, native_frame_len(start));
         }
@@ -352,6 +352,7 @@ static void expect_after_start(int is_other)
     free(bytes);
     dissect("start.pcapng", 1, fields);
     assert_int_equal(strstr(dissected_text(), "Points that nobody can place yet") != NULL, is_other);
+    if (!is_other) assert_string_equal(take_text(S "missing_pulses"), "0");
 }
 
 static void test_the_same_number_again(void **state)

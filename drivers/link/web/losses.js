@@ -111,17 +111,18 @@ export class Losses {
     this.#shots = scan === this.#before.scan ? shots - this.#before.shots : shots;
   }
 
-  // Whether a SCAN_START is of another scan with the number of the scan at hand, which has another start: the head has
-  // started again. The event of the scan at hand can come after its first points. Starts of points are rounded by less
+  // Whether a SCAN_START is of another scan with the number of the last one, which has another start: the head has
+  // started again. The event of the last scan can come after its first points. Starts of points are rounded by less
   // than a microsecond.
   #isAgain(e) {
-    if (!this.#isRunning || this.#scan !== e.scan || this.#t0_s === null) return false;
+    if (this.#scan !== e.scan || this.#t0_s === null) return false;
     return Math.abs(Number(e.at_ns) * 1e-9 - this.#t0_s) > 1e-6;
   }
 
   #restart({shots}) {
     this.#end(this.#scan, this.#final(this.#scan), shots);
     this.#scan = this.#counts = this.#due = null;
+    this.#before = {scan: null, shots: 0};
   }
 
   // The telemetry directly before SCAN_END, of state spin-down, has the final counts.

@@ -75,6 +75,7 @@ export class Decoder {
   notice({kind}) {
     if (kind !== 'restarted') return;
     if (!this.toldAlone) this.#forget();
+    this.lastPulse0 = -1; // lower pulses, and a scan's start, say nothing of the new sequence
     this.waves.clear(); // pulses and scans may have the numbers of earlier ones
     this.on.restarted?.({});
   }

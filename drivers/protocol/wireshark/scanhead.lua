@@ -616,7 +616,10 @@ local ABSORB = {
     local n_pulses, n = unpack_bytes("<I4I4", bytes, at + 33)
     if flow.last_pulse0 and pulse0 < flow.last_pulse0 then forget(flow) end
     if flow.anchor and flow.anchor.until_ns ~= 0 and t0_ns >= flow.anchor.until_ns then flow.anchor = nil end
-    flow.last_pulse0, flow.scan_t0_ns = pulse0, signed64(h.raw, 15) - t0_ns
+    local scan_t0_ns = signed64(h.raw, 15) - t0_ns
+    if not (flow.scan_t0_ns and math.abs(flow.scan_t0_ns - scan_t0_ns) <= 1000) then flow.received = 0 end
+    flow.received = flow.received + n_pulses -- since the first points with this start of a scan
+    flow.last_pulse0, flow.scan_t0_ns, flow.points_ns = pulse0, scan_t0_ns, signed64(h.raw, 15)
     flow.points = {seq = h.seq, packet = m.packet, key = pulse0 .. "/" .. line .. "/" .. n,
                    waves = pulse0 .. "/" .. line .. "/" .. time_in(h)}
     local begun = 0
@@ -644,7 +647,7 @@ local ABSORB = {
     flow.final = {scan = number_at(bytes, at + 4), fired = number64(bytes, at + 72), cast = number64(bytes, at + 80),
                   lost = number64(bytes, at + 88)}
   end,
-  [EVENT] = function(flow, _, bytes, at, m)
+  [EVENT] = function(flow, h, bytes, at, m)
     local code, a = number_at(bytes, at), number64(bytes, at + 8)
     local b, c = number64(bytes, at + 16), number64(bytes, at + 24)
     if code == 2 then
@@ -653,7 +656,13 @@ local ABSORB = {
       local is_other = flow.last_pulse0 and math.abs(flow.scan_t0_ns - signed64(bytes, at + 16)) > 1000
       if flow.descriptor and (flow.descriptor.scan ~= a or is_other) then forget(flow) end
       if is_other then flow.final = nil end
-      begin_scan(flow, a)
+      -- The event of the scan at hand can come after its first points, which count. One that is not later than the
+      -- last points is of another scan with the same start: two recordings may follow each other.
+      if flow.last_pulse0 and not is_other and signed64(h.raw, 15) > flow.points_ns then
+        flow.scan = {number = a, received = flow.received}
+      else
+        begin_scan(flow, a)
+      end
     elseif code == 3 and flow.final and flow.final.scan == a then
       local f = flow.final
       if f.fired ~= b or f.lost ~= c or f.cast > f.fired or f.lost > f.cast then
@@ -689,7 +698,8 @@ local function absorb(flow, h, bytes, at, m)
   if m.notice == RESTARTED then
     -- A descriptor for this reader alone that came just before belongs to the new sequence already.
     if not flow.told_alone then forget(flow) end
-    flow.scan, flow.final, flow.last_pulse0, flow.line = nil, nil, nil, {pulses = 0, whole = false}
+    flow.scan, flow.final, flow.last_pulse0, flow.scan_t0_ns = nil, nil, nil, nil
+    flow.line = {pulses = 0, whole = false}
   end
   flow.told_alone = h.is_local and (flow.told_alone or h.type == DESCRIPTOR)
   if m.notice then m.lost_so_far = flow.lost end

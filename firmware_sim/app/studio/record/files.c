@@ -372,10 +372,13 @@ int record_files_save(struct record_files *files, struct sh_err *err)
     return rc;
 }
 
-/* A scan begins with its event or, where that was lost, with a descriptor that is no repetition. */
-static int begins_scan(const struct scanhead_frame *frame)
+/* A scan begins with its event or, where that was lost, with a descriptor that is no repetition. The event of the scan
+ * at hand can come after its first points: with the same start, and later than these. */
+static int begins_scan(const struct record_files *files, const struct scanhead_frame *frame)
 {
-    if (frame->type == SCANHEAD_EVENT) return frame->event == SCANHEAD_EV_SCAN_START;
+    if (frame->type == SCANHEAD_EVENT)
+        return frame->event == SCANHEAD_EV_SCAN_START &&
+               !((int64_t)frame->event_value[1] == files->begin_ns && frame->t_ns > files->last_ns);
     return frame->type == SCANHEAD_DESCRIPTOR && (frame->flags & SCANHEAD_REPEAT) == 0;
 }
 
@@ -385,7 +388,7 @@ int record_files_frame(struct record_files *files, struct scanhead *sh, const st
     int rc = SH_OK;
     const int is_other = files->sh != NULL && sh != files->sh;
     files->sh = sh;
-    if (files->split && files->has_points && (begins_scan(frame) || is_other)) {
+    if (files->split && files->has_points && (begins_scan(files, frame) || is_other)) {
         rc = record_files_close(files, 1, err);
         if (rc == SH_OK) rc = record_files_open(files, err);
     } else if (files->n_spools > 0 && is_other) {
@@ -395,6 +398,10 @@ int record_files_frame(struct record_files *files, struct scanhead *sh, const st
     for (int i = 0; i < files->n && rc == SH_OK; i++)
         if (files->n_spools == 0 || !files->file[i].ops->track.wants_colours)
             rc = recorder_frame(files->file[i].rec, sh, frame, err);
-    if (rc == SH_OK && frame->type == SCANHEAD_POINTS) files->has_points = 1;
+    if (rc == SH_OK && frame->type == SCANHEAD_POINTS) {
+        files->has_points = 1;
+        files->begin_ns = (int64_t)((uint64_t)frame->t_ns - (uint64_t)frame->scan_t0_ns); /* a broken stream may wrap */
+        files->last_ns = frame->t_ns;
+    }
     return rc;
 }

@@ -29,8 +29,10 @@ struct record_files {
         int lacks; /* some of the frames that waited could not be given to it */
     } file[RECORD_MAX_FILES];
     int n;
-    unsigned part;               /* number of the scan in split files, from 1 */
-    int has_points;              /* a frame of points came for the present files */
+    unsigned part;  /* number of the scan in split files, from 1 */
+    int has_points; /* a frame of points came for the present files */
+    int64_t begin_ns,
+        last_ns; /* device times: of the start of the last points' scan, and of the first of these points */
     struct colour_spool **spool; /* one for each head that comes, in their order; frames wait there for the limits */
     uint32_t n_spools;           /* 0: no frame has to wait */
     const struct scanhead *sh;   /* the head from which the last frame came */

@@ -200,7 +200,9 @@ static void take_frame(struct watch *w, const struct scanhead_frame *frame)
     if (frame->type != SCANHEAD_EVENT) return;
     if (frame->event == SCANHEAD_EV_READER_LOST) note_lost(w, frame->event_value[2]);
     if (frame->event == SCANHEAD_EV_SCAN_END) atomic_store(&w->ended, (uint32_t)frame->event_value[0]);
-    if (frame->event == SCANHEAD_EV_SCAN_END || frame->event == SCANHEAD_EV_SCAN_START) end_scan(w);
+    /* The event of the scan at hand can come after its first points. The head at hand numbers its scans on. */
+    const int is_other = frame->event == SCANHEAD_EV_SCAN_START && (uint32_t)frame->event_value[0] != w->at.scan;
+    if (frame->event == SCANHEAD_EV_SCAN_END || is_other) end_scan(w);
 }
 
 /* Nothing has come for QUIET times NEXT_MS. At the pace `fast` no time passes for an idle head, so it sends no
