@@ -136,10 +136,10 @@ static void turn_about(const double axis[3], double angle, double at[3])
     memcpy(at, to, sizeof to);
 }
 
-/* Corners of 0.3 m by 0.3 m lie in any plane, and their decimals are cut: the normal that is left is rounding, and may
- * point along the plane. Each of the two triangles has half the square. Each corner is off by up to sqrt(3) / 2 of the
- * last decimal, and a triangle's area by no more than that times half of its sides, 0.51 m: in both, 0.9 mm x 1 m
- * at 1 mm. */
+/* Corners of 0.3 m by 0.3 m lie in a floor that is level but for a few steps of the last decimal: the normal that is
+ * left is rounding, and may point along the floor. Each of the two triangles has half the square. Each corner is off by
+ * up to sqrt(3) / 2 of the last decimal, and a triangle's area by no more than that times half of its sides, 0.51 m: in
+ * both, 0.9 mm x 1 m at 1 mm. */
 static void bow_ties_of_a_few_decimals_are_told(void **state)
 {
     (void)state;
@@ -153,7 +153,8 @@ static void bow_ties_of_a_few_decimals_are_told(void **state)
         const double angle = 2.0 * M_PI * rand() / RAND_MAX, off_m = pow(10.0, -digits);
         for (int i = 0; i < 4; i++) {
             double at[3] = {square[i][0], square[i][1], 0};
-            turn_about(axis, angle, at);
+            turn_about((const double[3]){0, 0, 1}, angle, at);
+            turn_about(axis, 20 * off_m, at);
             p += sprintf(p, "v %.*f %.*f %.*f\n", digits, at[0] + 1.234567, digits, at[1] + 1.234567, digits,
                          at[2] + 1.234567);
         }
