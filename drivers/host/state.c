@@ -92,7 +92,7 @@ static int absorb_points(struct scanhead *sh, const struct native_header *header
     struct native_points points;
     if (native_decode_points(payload, header->length, &points) != 0) return bad(sh, "wrong points");
     if (sh->have_pulse && points.pulse0 < sh->last_pulse0) forget(sh);
-    sh->times.scan_t0_ns = (int64_t)((uint64_t)header->t_ns - (uint64_t)points.t0_ns);
+    sh->times.scan_t0_ns = native_since_ns(header->t_ns, points.t0_ns);
     sh->times.have_scan_t0 = 1;
     int64_t until_ns = 1000000 * (int64_t)sh->anchor.until_ms; /* later points have an anchor that did not reach us */
     if (sh->have_anchor && until_ns != 0 && points.t0_ns >= until_ns) sh->have_anchor = 0;

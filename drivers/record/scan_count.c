@@ -31,7 +31,7 @@ void scan_count_frame(struct scan_count *count, const uint8_t *frame)
     int begins = header.type == NATIVE_POINTS && count->n_scans == 0;
     if (header.type == NATIVE_POINTS && native_decode_points(payload, header.length, &points) == 0) {
         count->has_points = 1;
-        count->begin_ns = (int64_t)((uint64_t)header.t_ns - (uint64_t)points.t0_ns); /* a broken file may wrap */
+        count->begin_ns = native_since_ns(header.t_ns, points.t0_ns);
     }
     if (header.type == NATIVE_EVENT && native_decode_event(payload, header.length, &event) == 0 &&
         scan_count_starts(count, &event)) {

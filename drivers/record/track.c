@@ -261,7 +261,7 @@ static int track_take_points(struct track *t, const struct scanhead_frame *frame
     t->state.last_pulse0 = frame->pulse0;
     t->state.last_station = t->info.station;
     t->state.last_scan = t->info.scan;
-    t->state.last_begin_ns = (int64_t)((uint64_t)frame->t_ns - (uint64_t)frame->scan_t0_ns);
+    t->state.last_begin_ns = native_since_ns(frame->t_ns, frame->scan_t0_ns);
     uint64_t row = first_row(t, frame);
     if (rc == 0) rc = track_begin_waiting(t, frame, row, err);
     if (rc == 0 && row > UINT32_MAX - frame->n_points)

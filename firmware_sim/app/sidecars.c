@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "firmware_sim/app/sidecars.h"
 
+#include <dirent.h>
 #include <limits.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,11 +18,20 @@
 
 enum { NAME_MAX_LEN = 255, DEEPEST = 1 }; /* a mesh names a .mtl, which names images */
 
+/* The names in a folder, sorted without regard to case. */
+struct listing {
+    char folder[PATH_MAX];
+    char **name;
+    size_t n;
+    int is_read, is_whole; /* is_whole 0: the folder could not be read, and may have any name */
+};
+
 struct search {
     int (*take)(void *ctx, const char *name, const char *path);
     void *ctx;
-    char folder[PATH_MAX]; /* of the mesh */
-    char here[PATH_MAX];   /* of the file that is being searched, perhaps a library in another folder */
+    char folder[PATH_MAX];     /* of the mesh */
+    char here[PATH_MAX];       /* of the file that is being searched, perhaps a library in another folder */
+    struct listing listing[2]; /* of `here` and of `folder` */
     char **seen;
     size_t n_seen;
     struct sh_err *err;
@@ -52,16 +62,77 @@ static void decode(const char *name, char *out)
     *out = '\0';
 }
 
-/* Tries the name as it stands, then decoded. Either may be a path on another machine: then only its last part counts,
- * in upper or lower case. */
-static int sidecars_find(const struct search *s, const char *name, int any_case, char path[PATH_MAX])
+static void forget_listing(struct listing *l)
+{
+    for (size_t i = 0; i < l->n; i++)
+        free(l->name[i]);
+    free(l->name);
+    *l = (struct listing){0};
+}
+
+static int compare_names(const void *a, const void *b)
+{
+    return strcasecmp(*(char *const *)a, *(char *const *)b);
+}
+
+static void read_listing(struct listing *l, const char *folder)
+{
+    if (l->is_read && strcmp(l->folder, folder) == 0) return;
+    forget_listing(l);
+    snprintf(l->folder, sizeof l->folder, "%s", folder);
+    l->is_read = 1;
+    size_t room = 0;
+    DIR *dir = opendir(folder[0] != '\0' ? folder : ".");
+    l->is_whole = dir != NULL;
+    for (const struct dirent *entry; l->is_whole && (entry = readdir(dir)) != NULL;) {
+        l->is_whole =
+            grow(&l->name, &room, l->n + 1, sizeof(char *)) && (l->name[l->n] = strdup(entry->d_name)) != NULL;
+        l->n += (size_t)l->is_whole;
+    }
+    if (dir != NULL) closedir(dir);
+    if (l->n > 0) qsort(l->name, l->n, sizeof(char *), compare_names);
+}
+
+static int is_listed(const struct listing *l, const char *part, size_t len)
+{
+    char name[NAME_MAX_LEN + 1], *key = name;
+    snprintf(name, sizeof name, "%.*s", (int)len, part);
+    return !l->is_whole || (l->n > 0 && bsearch(&key, l->name, l->n, sizeof(char *), compare_names) != NULL);
+}
+
+/* Whether a name can be that of a file in another case: a folder has its first part, or its last one. scene_find_file
+ * reads folders for each name, which would take many minutes beside thousands of images. */
+static int may_be_there(struct search *s, const char *name)
 {
     const char *const folder[] = {s->here, s->folder};
+    const char *first = name + strspn(name, "/\\"), *last = name;
+    for (const char *p; (p = strpbrk(last, "/\\")) != NULL;)
+        last = p + 1;
+    for (int i = 0; i < 2; i++) {
+        read_listing(&s->listing[i], folder[i]);
+        if (is_listed(&s->listing[i], first, strcspn(first, "/\\")) || is_listed(&s->listing[i], last, strlen(last)))
+            return 1;
+    }
+    return 0;
+}
+
+/* Finds a name as it stands, or in another case. To be freed; NULL: there is none. */
+static char *find_name(struct search *s, const char *name)
+{
+    const char *const folder[] = {s->here, s->folder};
+    char *file = scene_find_file(folder, 2, name, 0);
+    return file == NULL && may_be_there(s, name) ? scene_find_file(folder, 2, name, 1) : file;
+}
+
+/* Tries the name as it stands, then decoded. Either may be a path on another machine: then only its last part counts,
+ * in upper or lower case. */
+static int sidecars_find(struct search *s, const char *name, char path[PATH_MAX])
+{
     char decoded[NAME_MAX_LEN + 1];
     struct stat st;
     decode(name, decoded);
-    char *file = scene_find_file(folder, 2, name, any_case);
-    if (file == NULL) file = scene_find_file(folder, 2, decoded, any_case);
+    char *file = find_name(s, name);
+    if (file == NULL) file = find_name(s, decoded);
     const int is_found =
         file != NULL && stat(file, &st) == 0 && S_ISREG(st.st_mode) && snprintf(path, PATH_MAX, "%s", file) < PATH_MAX;
     free(file);
@@ -91,19 +162,18 @@ static int found(struct search *s, const char *name, const char *path, int depth
     return rc;
 }
 
-/* The name ends at `end`, and begins at `first` or after one of the blanks between both. To look for a name in another
- * case, folders are read, which takes long in one with thousands of images; so the names as they stand come first. */
+/* The name ends at `end`, and begins at `first` or after one of the blanks between both. A reader prefers the longest
+ * name for which there is a file, in any case. */
 static int try_names(struct search *s, const char *first, const char *end, int depth)
 {
     char name[NAME_MAX_LEN + 1], path[PATH_MAX];
     snprintf(name, sizeof name, "%.*s", (int)(end - first), first);
-    for (int any_case = 0; any_case < 2; any_case++)
-        for (const char *p = name; p != NULL; p = strchr(p, ' ')) {
-            while (*p == ' ')
-                p++;
-            if (!sidecars_find(s, p, any_case, path)) continue;
-            return is_seen(s, path) ? SH_OK : found(s, p, path, depth);
-        }
+    for (const char *p = name; p != NULL; p = strchr(p, ' ')) {
+        while (*p == ' ')
+            p++;
+        if (!sidecars_find(s, p, path)) continue;
+        return is_seen(s, path) ? SH_OK : found(s, p, path, depth);
+    }
     return SH_OK;
 }
 
@@ -171,5 +241,7 @@ int app_sidecars(const char *mesh, int (*take)(void *ctx, const char *name, cons
     for (size_t i = 0; i < s.n_seen; i++)
         free(s.seen[i]);
     free(s.seen);
+    for (int i = 0; i < 2; i++)
+        forget_listing(&s.listing[i]);
     return rc;
 }

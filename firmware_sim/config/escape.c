@@ -4,10 +4,15 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Characters of three bytes that YAML doesn't keep in a scalar. */
+/* Characters of three bytes that YAML doesn't keep in a scalar, or that are no characters of YAML at all (YAML 1.1,
+ * 5.1: those up to U+FFFD are). */
 static const struct {
     const char *bytes, *escape;
-} wide[] = {{"\xe2\x80\xa8", "\\u2028"}, {"\xe2\x80\xa9", "\\u2029"}, {"\xef\xbb\xbf", "\\ufeff"}};
+} wide[] = {{"\xe2\x80\xa8", "\\u2028"},
+            {"\xe2\x80\xa9", "\\u2029"},
+            {"\xef\xbb\xbf", "\\ufeff"},
+            {"\xef\xbf\xbe", "\\ufffe"},
+            {"\xef\xbf\xbf", "\\uffff"}};
 
 size_t config_escape(const char *p, char out[CONFIG_ESCAPE_ROOM])
 {

@@ -130,6 +130,16 @@ static void opacities_are_multiplied(void **state)
                {1, "", {0, 0, 0, 1}, false, -1, 1, "1 triangles left out: they have less opacity"},
                {1, "", {0, 0, 0, 1}, false, -1, 1, "1 triangles of masked materials have opacities of their corners"},
                {1, "", {0.75f, 0.75f, 0.75f, 0.75f}, false, -1, 2, ""},
+               /* 0.9f is 0.89999998, and 0.7f times 0.9 a little below 0.63: equal numbers as a file has them */
+               {1, ",\"alphaCutoff\":0.9", {0.9f, 0.9f, 0.9f, 0.9f}, false, -1, 2, ""},
+               {0.9, ",\"alphaCutoff\":0.63", {0.7f, 0.7f, 0.7f, 0.7f}, false, -1, 2, ""},
+               {1,
+                ",\"alphaCutoff\":0.9",
+                {0.8999999f, 0.8999999f, 0.8999999f, 0.8999999f},
+                false,
+                -1,
+                0,
+                "2 triangles left out: they have less opacity"},
                {1, "", {0.75f, 0.75f, 0.75f, 0.75f}, true, 0.5f, 2, "2 triangles of masked materials have opacities"}};
     for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
         char rest[4096];
@@ -155,6 +165,28 @@ static void opacities_are_multiplied(void **state)
         if (row[i].says[0] == '\0' && strstr(warnings, "triangles") != NULL) fail_msg("%zu: %s", i, warnings);
         scene_free(s);
     }
+}
+
+/* Colours of three numbers have no opacity. Where colours are not wanted, nothing of them is read, and so they may be
+ * broken: here there are too few. */
+static void colours_that_are_not_wanted(void **state)
+{
+    (void)state;
+    char rest[2048];
+    struct scene *s;
+    struct sh_err err = {0};
+    gltf_quad();
+    snprintf(rest, sizeof rest,
+             "\"nodes\":[{\"mesh\":0}],\"materials\":[{\"alphaMode\":\"MASK\"}],\"meshes\":[{\"primitives\":["
+             "{\"attributes\":{\"POSITION\":0,\"COLOR_0\":3},\"indices\":2,\"material\":0}]}],"
+             "\"accessors\":[" GLTF_QUAD_ACCESSORS
+             ",{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}]");
+    gltf_refuse(rest, "3 colours for 4 vertices");
+    const struct scene_mesh_spec spec = {.file = gltf_write("a.glb", rest), .scale = 1, .cutouts = 1};
+    if (load_spec(&spec, 1e-3, &s, &err) != SH_OK) fail_msg("%s", err.text);
+    assert_int_equal(s->n_triangles, 2);
+    scene_free(s);
+    unlink(path);
 }
 
 /* Each direction has its own way to repeat. A direction without a number repeats the image as it is. */
@@ -185,6 +217,7 @@ int main(void)
         cmocka_unit_test(colours_and_transparency),
         cmocka_unit_test(opacities_of_holes),
         cmocka_unit_test(opacities_are_multiplied),
+        cmocka_unit_test(colours_that_are_not_wanted),
         cmocka_unit_test(images_repeat),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

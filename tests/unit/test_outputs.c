@@ -225,6 +225,38 @@ static void files_of_a_mesh(void **state)
     unlink("m.mtl");
 }
 
+/* A name has blanks, and is written in another case than its file. The name's end is another file: the reader prefers
+ * the longer name, so that file is read. */
+static void names_with_blanks(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *map, *reads, *other;
+    } rows[] = {{"My Wood.png", "my wood.png", "Wood.png"},
+                {"My%20Wood.png", "my wood.png", "Wood.png"},
+                {"C:\\tex\\My Wood.png", "my wood.png", "Wood.png"},
+                {"Tex Tures/Wood.png", "tex tures/wood.png", "Tures"},
+                {"-s 1 1 Wood.png", "wood.png", "1.png"}};
+    assert_int_equal(mkdir("tex tures", 0700), 0);
+    write_text("m.obj", "mtllib m.mtl\nv 0.5 0 0\n");
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        struct app_input in = {0};
+        char text[128];
+        snprintf(text, sizeof text, "newmtl a\nmap_Kd %s\n", rows[i].map);
+        write_text("m.mtl", text);
+        write_text(rows[i].reads, "");
+        write_text(rows[i].other, "");
+        add(&in, NULL, "m.obj", APP_READS);
+        add(&in, "output", rows[i].reads, APP_WRITES);
+        if (app_check_files(&in, NULL, &err) != SH_EINPUT) fail_msg("%s", rows[i].map);
+        unlink(rows[i].reads);
+        unlink(rows[i].other);
+    }
+    unlink("m.obj");
+    unlink("m.mtl");
+    assert_int_equal(rmdir("tex tures"), 0);
+}
+
 /* Each option that names a file says whether it is read or written; otherwise it would not be compared. */
 static void options_say_what_their_files_are(void **state)
 {
@@ -243,9 +275,12 @@ static void options_say_what_their_files_are(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(files_are_apart), cmocka_unit_test(files_beside_a_file),
-        cmocka_unit_test(links),           cmocka_unit_test(files_that_are_filled),
-        cmocka_unit_test(files_of_a_mesh), cmocka_unit_test(options_say_what_their_files_are)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(files_are_apart),
+                                       cmocka_unit_test(files_beside_a_file),
+                                       cmocka_unit_test(links),
+                                       cmocka_unit_test(files_that_are_filled),
+                                       cmocka_unit_test(files_of_a_mesh),
+                                       cmocka_unit_test(names_with_blanks),
+                                       cmocka_unit_test(options_say_what_their_files_are)};
     return cmocka_run_group_tests(tests, go_there, come_back);
 }

@@ -96,11 +96,66 @@ static void colours_without_room(void **state)
            "left:a.ply.frames-2.shs failed0 drop0 keep1 keep2 close_spool0 close_spool1 ");
 }
 
+/* Each file that fails has its reason printed: the first error is returned, and the others are warnings. */
+static void each_reason_is_said(void **state)
+{
+    (void)state;
+    open_coloured();
+    fails = "0<90";
+    fails_too = "drain1";
+    close_all(1, SH_EIO);
+    assert_string_equal(err.text, "drain1 failed");
+    assert_ptr_equal(strstr(warned, "0<90 failed\n"), warned);
+    open_coloured();
+    fails = "0<90";
+    fails_too = "1<91";
+    close_all(1, SH_EIO);
+    assert_string_equal(err.text, "0<90 failed");
+    assert_ptr_equal(strstr(warned, "1<91 failed\n"), warned);
+    assert_null(strstr(warned, "0<90"));
+}
+
+/* A spool that has no file gives no frames back: the files get those of the other spools, and no frames have a name. */
+static void spools_without_a_file(void **state)
+{
+    (void)state;
+    fails = "spool:a.ply";
+    add("a.ply");
+    files.own_limits = 1;
+    assert_int_equal(record_files_open(&files, &err), SH_EIO);
+    expect("open:a.ply spool:a.ply close_spool0 drop0 ");
+    close_all(1, SH_OK);
+    expect("");
+    make(NULL); /* the second head's */
+    add("a.ply");
+    files.own_limits = 1;
+    open_all();
+    points(HEAD_A, 1);
+    fails = "spool:a.ply";
+    assert_int_equal(frame(HEAD_B, 2, SCANHEAD_POINTS, 0, 0), SH_EIO);
+    expect("open:a.ply spool:a.ply s0<1 spool:a.ply close_spool1 ");
+    close_all(1, SH_OK);
+    expect("drain0 0<90 keep0 close_spool0 ");
+    make(NULL); /* the second scan's */
+    add("a.ply");
+    files.own_limits = files.split = 1;
+    open_all();
+    points(HEAD_A, 1);
+    fails = "spool:a-2.ply";
+    assert_int_equal(frame(HEAD_A, 2, SCANHEAD_EVENT, SCANHEAD_EV_SCAN_START, 0), SH_EIO);
+    expect("open:a-1.ply spool:a-1.ply s0<1 drain0 0<90 keep0 close_spool0 open:a-2.ply spool:a-2.ply close_spool1 "
+           "drop0 ");
+    close_all(1, SH_OK);
+    expect("");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(frames_that_wait, make),
         cmocka_unit_test_setup(colours_without_room, make),
+        cmocka_unit_test_setup(each_reason_is_said, make),
+        cmocka_unit_test_setup(spools_without_a_file, make),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -123,6 +123,50 @@ static void bow_ties_without_area_are_told(void **state)
         }
 }
 
+/* Turns a vector about the unit axis of its three numbers (Rodrigues' formula). */
+static void turn_about(const double axis[3], double angle, double at[3])
+{
+    const double along = axis[0] * at[0] + axis[1] * at[1] + axis[2] * at[2];
+    double to[3];
+    for (int k = 0; k < 3; k++) {
+        const int l = (k + 1) % 3, m = (k + 2) % 3;
+        to[k] = at[k] * cos(angle) + (axis[l] * at[m] - axis[m] * at[l]) * sin(angle) +
+                axis[k] * along * (1.0 - cos(angle));
+    }
+    memcpy(at, to, sizeof to);
+}
+
+/* Corners of 0.3 m by 0.3 m lie in a floor that is level but for a few steps of the last decimal: the normal that is
+ * left is rounding, and may point along the floor. Each of the two triangles has half the square. Each corner is off by
+ * up to sqrt(3) / 2 of the last decimal, and a triangle's area by no more than that times half of its sides, 0.51 m: in
+ * both, 0.9 mm x 1 m at 1 mm. */
+static void bow_ties_of_a_few_decimals_are_told(void **state)
+{
+    (void)state;
+    static const double square[4][2] = {{0, 0}, {0.3, 0}, {0, 0.3}, {0.3, 0.3}};
+    srand(11);
+    for (int turn = 0; turn < 200; turn++) {
+        char text[512], *p = text;
+        const int digits = turn % 2 == 0 ? 3 : 6;
+        const double up = 2.0 * rand() / RAND_MAX - 1.0, east = 2.0 * M_PI * rand() / RAND_MAX;
+        const double axis[3] = {sqrt(1.0 - up * up) * cos(east), sqrt(1.0 - up * up) * sin(east), up};
+        const double angle = 2.0 * M_PI * rand() / RAND_MAX, off_m = pow(10.0, -digits);
+        for (int i = 0; i < 4; i++) {
+            double at[3] = {square[i][0], square[i][1], 0};
+            turn_about((const double[3]){0, 0, 1}, angle, at);
+            turn_about(axis, 20 * off_m, at);
+            p += sprintf(p, "v %.*f %.*f %.*f\n", digits, at[0] + 1.234567, digits, at[1] + 1.234567, digits,
+                         at[2] + 1.234567);
+        }
+        sprintf(p, "f 1 2 3 4\n");
+        struct scene *s = load_text("bow.obj", text);
+        if (strstr(warnings, "bow.obj: the outlines of 1 polygons cross themselves") == NULL)
+            fail_msg("%d, %d digits: %s", turn, digits, warnings);
+        if (!(fabs(total_area(s) - 0.09) < 0.9 * off_m)) fail_msg("%d, %d digits: %g", turn, digits, total_area(s));
+        scene_free(s);
+    }
+}
+
 static void corners_have_a_limit(void **state)
 {
     (void)state;
@@ -140,8 +184,11 @@ static void corners_have_a_limit(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(polygons_keep_their_area), cmocka_unit_test(keyholes_keep_their_area),
-        cmocka_unit_test(crossing_polygon_is_told), cmocka_unit_test(bow_ties_without_area_are_told),
+        cmocka_unit_test(polygons_keep_their_area),
+        cmocka_unit_test(keyholes_keep_their_area),
+        cmocka_unit_test(crossing_polygon_is_told),
+        cmocka_unit_test(bow_ties_without_area_are_told),
+        cmocka_unit_test(bow_ties_of_a_few_decimals_are_told),
         cmocka_unit_test(corners_have_a_limit),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

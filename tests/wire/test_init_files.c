@@ -89,12 +89,45 @@ static void warnings_of_a_mesh_that_fails_are_said(void **state)
     has(err_text, "flat.obj: 2 triangles without area left out");
 }
 
+/* Only the path from the configuration's folder is written. So the folder may have any name, and the mesh's may not. */
+static void names_of_folders_may_be_any(void **state)
+{
+    struct wire *wire = *state;
+    static const char *const names[] = {"b\xe4u", "two\nlines"}; /* Latin-1 */
+    static const char *const says[] = {"its path is not UTF-8", "its path has control characters"};
+    static const char floor[] = "v 0 0 0\nv 9 0 0\nv 9 9 0\nv 0 9 0\nf 1 2 3 4\n";
+    for (int i = 0; i < 2; i++) {
+        char there[64], mesh[352], config[352];
+        snprintf(there, sizeof there, "%s/floor.obj", names[i]);
+        assert_int_equal(mkdir(wire_path(wire, names[i]), 0700), 0);
+        wire_write_text(wire, there, floor);
+        snprintf(mesh, sizeof mesh, "%s", wire_path(wire, there));
+        assert_int_equal(init(wire, there), 2);
+        assert_null(made);
+        has(err_text, says[i]);
+        snprintf(there, sizeof there, "%s/floor.yaml", names[i]);
+        snprintf(config, sizeof config, "%s", wire_path(wire, there));
+        const char *const args[] = {"init", mesh, "-o", config, NULL};
+        const int status = wire_wait(wire, wire_spawn(wire, args, "out", "err", -1));
+        char *err_here = wire_read(wire_path(wire, "err"), NULL);
+        if (status != 0) fail_msg("%s", err_here);
+        free(err_here);
+        char *yaml = wire_read(config, NULL);
+        has(yaml, "file: \"floor.obj\"");
+        free(yaml);
+        unlink(config);
+        unlink(mesh);
+        rmdir(wire_path(wire, names[i]));
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(a_raster_gives_the_place, wire_setup, forget),
         cmocka_unit_test_setup_teardown(long_names_of_glass_stay_whole, wire_setup, forget),
         cmocka_unit_test_setup_teardown(warnings_of_a_mesh_that_fails_are_said, wire_setup, forget),
+        cmocka_unit_test_setup_teardown(names_of_folders_may_be_any, wire_setup, forget),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

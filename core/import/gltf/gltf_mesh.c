@@ -77,6 +77,13 @@ static int take_corner(struct part *p, uint32_t i, int c)
     return SH_OK;
 }
 
+/* Whether an opacity of corners makes a hole. Those of glTF have single precision, and so has the comparison: 0.9f is
+ * below 0.9 of the JSON, but the file means the same number. */
+static bool is_below(const struct part *p, double alpha)
+{
+    return (float)(alpha * p->look.opacity) < (float)p->look.cutoff;
+}
+
 /* Whether a triangle is a hole all over: no point of it has more opacity than its corners. Other opacities of corners
  * have no place in a scene. They are counted. */
 static bool is_hole(struct part *p, const uint32_t vertex[3])
@@ -88,9 +95,9 @@ static bool is_hole(struct part *p, const uint32_t vertex[3])
         most = fmax(most, alpha);
         least = fmin(least, alpha);
     }
-    const bool is = most * p->look.opacity < p->look.cutoff;
+    const bool is = is_below(p, most);
     if (is) p->g->n_holes++;
-    if (!is && least < 1.0 && (p->look.has_texture || least * p->look.opacity < p->look.cutoff)) p->g->n_faded++;
+    if (!is && least < 1.0 && (p->look.has_texture || is_below(p, least))) p->g->n_faded++;
     return is;
 }
 
@@ -114,15 +121,14 @@ static int add_triangle(struct part *p, const uint32_t corner[3])
     b->has_rgb = p->colour.count != GLTF_NONE && build_wants_colours(b);
     for (int c = 0; c < 3 && rc == SH_OK; c++)
         rc = find_vertex(p, corner[c], &vertex[c]);
+    if (rc == SH_OK && (p->g->n_done++ & 0xffff) == 0)
+        rc = build_progress(b, (double)p->g->n_drawn / ((double)p->g->n_nodes + 1.0), p->g->err);
     if (rc != SH_OK || is_hole(p, vertex)) return rc;
     for (int c = 0; c < 3 && rc == SH_OK; c++)
         rc = take_corner(p, vertex[c], c);
     if (rc != SH_OK) return rc;
     if (is_turned_over(p, vertex)) build_turn_over(b, 3);
-    rc = build_polygon(b, 3, p->look.label, p->g->err);
-    if (rc == SH_OK && (p->g->n_done++ & 0xffff) == 0)
-        rc = build_progress(b, (double)p->g->n_drawn / ((double)p->g->n_nodes + 1.0), p->g->err);
-    return rc;
+    return build_polygon(b, 3, p->look.label, p->g->err);
 }
 
 /* Left-over corners that make no whole triangle count as one triangle left out. */
@@ -203,6 +209,7 @@ static int open_colour(struct part *p, const json_t *attributes, const char *at)
     if (rc != SH_OK) return rc;
     const char *type = gltf_text(of, "type");
     p->has_alpha = type == NULL || strcmp(type, "VEC3") != 0;
+    if (!p->has_alpha && !build_wants_colours(p->g->b)) return SH_OK; /* it would not be read */
     rc = gltf_view_open(p->g, accessor, p->has_alpha ? "VEC4" : "VEC3", &p->colour);
     if (rc == SH_OK && p->colour.count < p->pose.position.count)
         rc = gltf_fail(p->g, "%s: %u colours for %u vertices", at, p->colour.count, p->pose.position.count);

@@ -83,9 +83,6 @@ static int find_path(const struct init_run *run, char path[CONFIG_PATH_LEN], str
     snprintf(folder, sizeof folder, "%s", run->output);
     if (realpath(run->wish.file, mesh) == NULL)
         return sh_fail(err, SH_EINPUT, "%s: %s", run->wish.file, strerror(errno));
-    if (!is_utf8(mesh))
-        return sh_fail(err, SH_EINPUT, "%s: its path is not UTF-8, so YAML can't name it; allowed is UTF-8: rename it",
-                       run->name);
     if (realpath(dirname(folder), from) == NULL) return sh_fail(err, SH_EINPUT, "%s: %s", folder, strerror(errno));
     size_t same = 0, used = 0;
     for (size_t i = 0; mesh[i] == from[i] || (from[i] == '\0' && mesh[i] == '/'); i++) {
@@ -102,9 +99,13 @@ static int find_path(const struct init_run *run, char path[CONFIG_PATH_LEN], str
     return SH_OK;
 }
 
-/* A key that names a file takes no such text. */
+/* Checks what the configuration will have: the folders above it may have any names. A key that names a file takes no
+ * control characters. */
 static int check_path(const struct init_run *run, struct sh_err *err)
 {
+    if (!is_utf8(run->path))
+        return sh_fail(err, SH_EINPUT, "%s: its path is not UTF-8, so YAML can't name it; allowed is UTF-8: rename it",
+                       run->name);
     for (const char *p = run->path; *p != '\0'; p++)
         if ((unsigned char)*p < 0x20 || *p == 0x7f)
             return sh_fail(

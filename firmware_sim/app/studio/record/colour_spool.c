@@ -42,7 +42,7 @@ static int fail_spool(const struct colour_spool *spool, struct sh_err *err)
 
 /* Makes a file without a name in the folder of `path`: it vanishes with this process, even a killed one. A file of
  * O_TMPFILE can get a name later, and a file that was unlinked can't; but not all file systems have O_TMPFILE. */
-static int open_nameless(const char *path)
+static int open_nameless(const char *path, int *is_unlinked)
 {
     char *folder = strndup(path, (size_t)(basename(path) - path)), *name = NULL;
     int fd = -1;
@@ -50,7 +50,7 @@ static int open_nameless(const char *path)
     free(folder);
     if (fd >= 0 || asprintf(&name, "%s.frames-XXXXXX", path) < 0) return fd;
     fd = mkostemp(name, O_CLOEXEC);
-    if (fd >= 0) unlink(name);
+    *is_unlinked = fd >= 0 && unlink(name) == 0;
     const int why = errno;
     free(name);
     errno = why;
@@ -65,7 +65,7 @@ int colour_spool_open(struct colour_spool *spool, const char *path, enum colour_
     spool->track.path = path;
     spool->track.ops = &ops;
     spool->track.rec = spool;
-    const int fd = open_nameless(path);
+    const int fd = open_nameless(path, &spool->is_unlinked);
     if (fd < 0) return fail_spool(spool, err);
     spool->file = fdopen(fd, "w+b");
     if (spool->file != NULL) return SH_OK;
@@ -135,7 +135,13 @@ int colour_spool_keep(struct colour_spool *spool, const char *path, struct sh_er
     const char *end = rc == SH_OK ? "" : ".part";
     char *name = NULL;
     if (asprintf(&name, "%s%s", path, end) < 0) return sh_fail(err, SH_ENOMEM, "%s: no memory for its name", path);
-    if (linkat(AT_FDCWD, own, AT_FDCWD, name, AT_SYMLINK_FOLLOW) != 0)
+    if (spool->is_unlinked)
+        rc =
+            sh_fail(err, SH_ESTATE,
+                    "%s: cannot keep the frames: a file without a name can't get one on this file system, as it has no "
+                    "O_TMPFILE",
+                    name);
+    else if (linkat(AT_FDCWD, own, AT_FDCWD, name, AT_SYMLINK_FOLLOW) != 0)
         rc = sh_fail(err, SH_ESTATE, "%s: cannot keep the frames: %s", name, strerror(errno));
     else if (rc != SH_OK)
         sh_fail(err, rc, "%s: the last frames could not be written", name);

@@ -16,7 +16,7 @@ struct colour_spool {
     enum colour_mode mode;
     FILE *file;
     uint64_t bytes;
-    int has_points;
+    int has_points, is_unlinked; /* the file had a name, so it can't get another one */
     struct track track;
     struct scanhead *sh; /* reads the stored frames back */
 };

@@ -171,8 +171,14 @@ static int add_spool(struct record_files *files, struct sh_err *err)
     if (!resize(&files->spool, files->n_spools + (size_t)1, sizeof(struct colour_spool *)) ||
         (spool = calloc(1, sizeof *spool)) == NULL)
         return sh_fail(err, SH_ENOMEM, "%s: no memory to keep its frames", files->file[0].path);
-    files->spool[files->n_spools++] = spool;
-    return colour_spool_open(spool, files->file[0].now, files->recorder.colour.scale.mode, err);
+    const int rc = colour_spool_open(spool, files->file[0].now, files->recorder.colour.scale.mode, err);
+    if (rc == SH_OK) {
+        files->spool[files->n_spools++] = spool;
+        return SH_OK;
+    }
+    colour_spool_close(spool); /* it has no file, so nothing may be read back from it */
+    free(spool);
+    return rc;
 }
 
 /* A file that gets its colours at the end is opened now, too: an error of writing must come before the scan. */
@@ -253,29 +259,36 @@ int record_files_open(struct record_files *files, struct sh_err *err)
     files->has_points = 0;
     for (int i = 0; i < files->n && rc == SH_OK; i++)
         rc = open_file(files, &files->file[i], err);
-    return rc == SH_OK && files->own_limits && record_files_have_colours(files) ? add_spool(files, err) : rc;
+    if (rc == SH_OK && files->own_limits && record_files_have_colours(files)) rc = add_spool(files, err);
+    if (rc != SH_OK) record_files_close(files, 0, NULL); /* these files get no frame, so none is kept as a whole one */
+    return rc;
 }
 
 /* Frames for files with colours, and the first error. A file that fails gets no more of them. */
 struct colouring {
     struct record_files *files;
     struct sh_err first;
+    int n_left; /* files that still get frames */
 };
 
 static int to_coloured(void *ctx, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)
 {
     struct colouring *c = ctx;
-    int n_left = 0;
+    c->n_left = 0;
     for (int i = 0; i < c->files->n; i++) {
         struct record_file *file = &c->files->file[i];
         struct sh_err why = {0};
         if (!file->ops->track.wants_colours || file->lacks) continue;
         const int rc = recorder_frame(file->rec, sh, frame, &why);
         file->lacks = rc != SH_OK;
-        n_left += rc == SH_OK;
-        if (rc != SH_OK && c->first.code == SH_OK) sh_fail(&c->first, rc, "%s", why.text);
+        c->n_left += rc == SH_OK;
+        if (rc == SH_OK) continue;
+        if (c->first.code == SH_OK)
+            sh_fail(&c->first, rc, "%s", why.text);
+        else
+            sh_warn(c->files->recorder.report, "%s", why.text);
     }
-    return n_left > 0 ? SH_OK : sh_fail(err, c->first.code, "%s", c->first.text);
+    return c->n_left > 0 ? SH_OK : sh_fail(err, c->first.code, "%s", c->first.text);
 }
 
 /* Gives the frames that waited to the files with colours. The limits of the colours are taken over all spools. */
@@ -293,6 +306,8 @@ static int colour_files(struct record_files *files, struct sh_err *err)
         if (files->file[i].rec != NULL && low <= high) recorder_set_limits(files->file[i].rec, low, high);
     for (uint32_t i = 0; i < files->n_spools && rc == SH_OK; i++)
         rc = colour_spool_drain(files->spool[i], to_coloured, &c, files->recorder.report, err);
+    /* Where files are left, the error is that of reading, and the file's own one would be lost. */
+    if (rc != SH_OK && c.n_left > 0 && c.first.code != SH_OK) sh_warn(files->recorder.report, "%s", c.first.text);
     for (int i = 0; i < files->n && rc != SH_OK; i++)
         files->file[i].lacks = files->file[i].ops->track.wants_colours;
     return rc == SH_OK && c.first.code != SH_OK ? sh_fail(err, c.first.code, "%s", c.first.text) : rc;

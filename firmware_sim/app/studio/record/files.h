@@ -63,7 +63,8 @@ int record_files_check_heads(const struct record_files *files, struct sh_err *er
 /* SH_EINPUT, with file and station, where a file can't hold a scan; `first` is the first scan of the recording. */
 int record_files_check_scan(const struct record_files *files, const struct recorder_scan *first,
                             const struct recorder_scan *scan, struct sh_err *err);
-/* SH_EINPUT: a recording that was killed has left something there, and the format can be repaired. */
+/* SH_EINPUT: a recording that was killed has left something there, and the format can be repaired. After an error no
+ * file is left. */
 int record_files_open(struct record_files *files, struct sh_err *err);
 /* To be called about once a second: the points so far go to the disk. */
 int record_files_save(struct record_files *files, struct sh_err *err);

@@ -113,12 +113,6 @@ static void count_pulses(struct recording *r, const struct scanhead_frame *frame
     r->broken = 0;
 }
 
-/* Times of a broken stream may be further apart than 64 bits hold; then the difference wraps. */
-static int64_t ns_since(int64_t t_ns, int64_t from_ns)
-{
-    return (int64_t)((uint64_t)t_ns - (uint64_t)from_ns);
-}
-
 /* Each of the `frames` of a sphere head has a line for every ring, so scan_s gets the number of rings as a factor. */
 static uint32_t lines_of_frame(const struct scanhead *sh)
 {
@@ -132,7 +126,7 @@ static void look_at(struct recording *r, const struct scanhead_frame *frame)
     count_pulses(r, frame);
     if (frame->type == SCANHEAD_POINTS) {
         r->scan_started = 1;
-        if (r->scan_t0_ns < 0) r->scan_t0_ns = ns_since(frame->t_ns, frame->scan_t0_ns);
+        if (r->scan_t0_ns < 0) r->scan_t0_ns = native_since_ns(frame->t_ns, frame->scan_t0_ns);
     }
     if (frame->type == SCANHEAD_DESCRIPTOR) r->scan_s = progress_scan_s(frame);
     if (frame->type == SCANHEAD_EMITTER) r->scan_s *= lines_of_frame(r->sh);
@@ -218,7 +212,7 @@ static int replug(struct recording *r, int why, struct sh_err *err)
 static int is_long_enough(const struct recording *r, const struct scanhead_frame *frame)
 {
     if (!(r->o->duration_s > 0.0) || r->o->head_ends || r->scan_t0_ns < 0) return 0;
-    return (double)ns_since(frame->t_ns, r->scan_t0_ns) >= 1e9 * r->o->duration_s;
+    return (double)native_since_ns(frame->t_ns, r->scan_t0_ns) >= 1e9 * r->o->duration_s;
 }
 
 /* Takes one frame. Returns 1: got one; 0: none in time; negative: the recording is over. */
@@ -237,7 +231,7 @@ static int step(struct recording *r, int timeout_ms, struct sh_err *err)
         r->heard_ns = r->pulses_ns = r->now_ns;
         count_points(r, &frame);
     }
-    if (r->scan_t0_ns >= 0) r->into_s = 1e-9 * (double)ns_since(frame.t_ns, r->scan_t0_ns);
+    if (r->scan_t0_ns >= 0) r->into_s = 1e-9 * (double)native_since_ns(frame.t_ns, r->scan_t0_ns);
     if (is_long_enough(r, &frame)) r->stopping = 1;
     rc = r->o->frame(r->o->ctx, r->sh, &frame, err);
     if (rc == SH_OK && goes_off(&frame) && !r->o->listen)

@@ -170,7 +170,7 @@ enum recording_news recording_count(struct recording_counts *c, const struct sca
         c->within = 1;
         c->pulses += frame->n_pulses;
         c->scan.pulses += frame->n_pulses;
-        c->scan.t0_ns = (int64_t)((uint64_t)frame->t_ns - (uint64_t)frame->scan_t0_ns); /* a broken stream may wrap */
+        c->scan.t0_ns = native_since_ns(frame->t_ns, frame->scan_t0_ns);
         c->scan.last_ns = frame->t_ns;
         return RECORDING_NOTHING;
     case SCANHEAD_DESCRIPTOR:
