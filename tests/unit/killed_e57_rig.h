@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* For tests of repair: an E57 file that was recorded to its end, and the same file as a power cut would have left it. */
+/* For tests of repair: an E57 file that was recorded to its end, and the file as a power cut would have left it. */
 #ifndef TESTS_UNIT_KILLED_E57_RIG_H
 #define TESTS_UNIT_KILLED_E57_RIG_H
 
@@ -19,8 +19,8 @@ struct killed_e57 {
 };
 extern struct killed_e57 killed_e57;
 
-/* Records three scans. Lines have a second or more between them, so that packets are short. The stream's last points are
- * written in the packet that the end of the recording makes. The third scan has nine lines, or one of shots without
+/* Records three scans. Lines have a second or more between them, so that packets are short. The stream's last points
+ * are written in the packet that the end of the recording makes. The third scan has nine lines, or one of shots without
  * echo. */
 void killed_e57_record(bool has_third, bool empty_shots, bool coloured);
 

@@ -96,9 +96,9 @@ static void crossing_polygon_is_told(void **state)
     scene_free(s);
 }
 
-/* Twice a triangle of 1 m2, once turning left and once right: the normal adds up to 0, or to what rounding leaves of it.
- * Both triangles that are made of it lie in the plane of the corners. They have 2 m2 each, as any of three corners of a
- * square have. */
+/* Twice a triangle of 1 m2, once turning left and once right: the normal adds up to 0, or to what rounding leaves of
+ * it. Both triangles that are made of it lie in the plane of the corners. They have 2 m2 each, as any of three corners
+ * of a square have. */
 static void bow_ties_without_area_are_told(void **state)
 {
     (void)state;

@@ -183,7 +183,7 @@ static void babbling_client(struct wire *wire, const char *link)
          *code != NULL; code++)
         assert_int_equal(atoi(client_ask(watch, "SYST:ERR?")), atoi(*code));
 
-    /* A line of 1000 characters is refused whole. The line after it is accepted. The client takes lines of up to 256. */
+    /* A line of 1000 characters is refused whole. The line after it is accepted. The client takes up to 256 at once. */
     char line[257], before[744];
     memset(before, 'A', sizeof before);
     memset(line, 'A', 256);
