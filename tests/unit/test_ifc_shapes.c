@@ -167,6 +167,35 @@ static void marks_are_those_of_the_body(void **state)
     ifc_records_close(&records);
 }
 
+/* A representation maps another one 16 times, and that likewise, 12 deep, and the last maps itself: 16 to the power of
+ * 12 ways lead through them. Each is looked at once. The body stands at the end. */
+static void mapped_ways_are_not_counted(void **state)
+{
+    (void)state;
+    enum { DEPTH = 12, FAN = 16 };
+    static char more[1 << 14];
+    for (int has = 0; has < 2; has++) {
+        size_t n = (size_t)snprintf(more, sizeof more, "#7999=IFCPOLYLINE((#9,#9));\n");
+        for (int i = 0; i < DEPTH; i++) {
+            const int id = 8000 + 100 * i, to = i + 1 < DEPTH ? id + 100 : id;
+            n += (size_t)snprintf(more + n, sizeof more - n, "#%d=IFCREPRESENTATIONMAP(#12,#%d);\n", id, id + 1);
+            n += (size_t)snprintf(more + n, sizeof more - n, "#%d=IFCSHAPEREPRESENTATION(#13,'Body','Any',(", id + 1);
+            for (int k = 0; k < FAN; k++)
+                n += (size_t)snprintf(more + n, sizeof more - n, "#%d,", id + 2 + k);
+            n += (size_t)snprintf(more + n, sizeof more - n, "#%s));\n", has && i + 1 == DEPTH ? "1060" : "7999");
+            for (int k = 0; k < FAN; k++)
+                n += (size_t)snprintf(more + n, sizeof more - n, "#%d=IFCMAPPEDITEM(#%d,#12);\n", id + 2 + k, to);
+        }
+        snprintf(more + n, sizeof more - n,
+                 "#9900=IFCPRODUCTDEFINITIONSHAPE($,$,(#8001));\n"
+                 "#9901=IFCWALL('guid_of_fan',#5,'fan',$,$,#1003,#9900,$,$);\n");
+        ifc_write_text(text, "IFC4", NULL, NULL, ifc_shapes, 1, more);
+        open_text();
+        assert_int_equal(ifc_records_product(&records, 9901)->has_body, has);
+        ifc_records_close(&records);
+    }
+}
+
 /* An analysis model has the shapes of the building a second time, and loads. */
 static void analysis_models_are_marked(void **state)
 {
@@ -283,6 +312,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(bodies_are_chosen),
         cmocka_unit_test(marks_are_those_of_the_body),
+        cmocka_unit_test(mapped_ways_are_not_counted),
         cmocka_unit_test(analysis_models_are_marked),
         cmocka_unit_test(indexed_points_become_a_list),
         cmocka_unit_test(index_without_a_point_is_refused),
