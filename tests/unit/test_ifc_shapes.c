@@ -261,6 +261,27 @@ static void indexed_points_become_a_list(void **state)
     }
 }
 
+/* Face sets use more lists in turn than are kept: list k has the point k alone. */
+static void lists_in_turn_keep_apart(void **state)
+{
+    (void)state;
+    enum { LISTS = 6, TURNS = 2 };
+    char more[2048], want[128];
+    size_t n = 0;
+    for (int k = 0; k < LISTS; k++)
+        n += (size_t)snprintf(more + n, sizeof more - n, "#%d=IFCCARTESIANPOINTLIST3D(((%d.,0.,0.))%s);\n", 7000 + k, k,
+                              k % 2 ? ",$" : "");
+    for (int i = 0; i < LISTS * TURNS; i++)
+        n += (size_t)snprintf(more + n, sizeof more - n, "#%d=IFCTRIANGULATEDFACESET(#%d,$,$,((1,1,1)),(1));\n",
+                              7100 + i, 7000 + i % LISTS);
+    add_records(more);
+    for (int i = 0; i < LISTS * TURNS; i++) {
+        snprintf(want, sizeof want, "=IFCCARTESIANPOINTLIST3D(((%d.,0.,0.))%s);#%d=IFCTRIANGULATEDFACESET(", i % LISTS,
+                 i % LISTS % 2 ? ",$" : "", 7100 + i);
+        has_edited(want);
+    }
+}
+
 static void index_without_a_point_is_refused(void **state)
 {
     (void)state;
@@ -315,6 +336,7 @@ int main(void)
         cmocka_unit_test(mapped_ways_are_not_counted),
         cmocka_unit_test(analysis_models_are_marked),
         cmocka_unit_test(indexed_points_become_a_list),
+        cmocka_unit_test(lists_in_turn_keep_apart),
         cmocka_unit_test(index_without_a_point_is_refused),
         cmocka_unit_test(holes_of_a_network_are_left_out),
     };
