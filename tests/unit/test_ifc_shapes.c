@@ -25,6 +25,11 @@ static const char common[] =
     "#7022=IFCMAPPEDITEM(#7021,#12);\n"
     "#7023=IFCSHAPEREPRESENTATION(#13,'Clearance','SweptSolid',(#1060));\n#7024=IFCREPRESENTATIONMAP(#12,#7023);\n"
     "#7025=IFCMAPPEDITEM(#7024,#12);\n#7026=IFCGEOMETRICSET((#7026,#7026));\n"
+    "#7027=IFCSHAPEREPRESENTATION(#13,'FootPrint','Curve2D',(#7000));\n#7028=IFCREPRESENTATIONMAP(#12,#7027);\n"
+    "#7029=IFCMAPPEDITEM(#7028,#12);\n#7030=IFC2DCOMPOSITECURVE((#7031),.U.);\n"
+    "#7031=IFCCOMPOSITECURVESEGMENT(.CONTINUOUS.,.T.,#7000);\n#7032=IFCBEZIERCURVE(1,(#9,#9),.UNSPECIFIED.,.F.,.F.);\n"
+    "#7033=IFCRATIONALBEZIERCURVE(1,(#9,#9),.UNSPECIFIED.,.F.,.F.,(1.,1.));\n"
+    "#7034=IFCLINEARDIMENSION((#7000));\n#7035=IFCGEOMETRICSET((#7030,#7032,#7033,#7034));\n"
     "#6100=IFCPRODUCTDEFINITIONSHAPE($,$,(#6000, #6001\n,#6002));\n"
     "#6101=IFCWALL('guid_of_wall',#5,'wall',$,$,#1003,#6100,$,$);\n"
     "#6102=IFCWALL('guid_of_other',#5,'other',$,$,#1003,#6100,$,$);\n";
@@ -129,6 +134,26 @@ static void bodies_are_chosen(void **state)
         {{"#13,$,'MappedRepresentation',(#7022)", "#13,$,'MappedRepresentation',(#7025)", CURVE}, "101", "b"},
         {{"#13,'Body','MappedRepresentation',(#7025)", CURVE, CURVE}, "111", "b"},
         {{"#13,'Clearance','SweptSolid',(#1060)", "#13,'Profile','SweptSolid',(#1060)", CURVE}, "001", "u"},
+        /* It may map several: the best that is a body counts. */
+        {{"#13,$,'MappedRepresentation',(#7029,#7022)", "#13,'Box','SweptSolid',(#1060)", CURVE}, "101", "b"},
+        {{"#13,$,'MappedRepresentation',(#7025,#7022)", "#13,'','MappedRepresentation',(#7025,#7029)", CURVE},
+         "101",
+         "b"},
+        {{"#13,$,'MappedRepresentation',(#7029,#7025)", "#13,'Body','SweptSolid',(#1060)", CURVE}, "011", "b"},
+        /* A body of a type that no reader is known to build takes nothing else out. */
+        {{"#13,'Body','SweptSolid',(#7006)", "#13,'Body-FallBack','Brep',(#1060)", CURVE}, "011", "b"},
+        {{"#13,'Body','SweptSolid',(#7006)", "#13,'Facetation','Brep',(#1060)", "#13,'Clearance','Brep',(#1060)"},
+         "010",
+         "b"},
+        {{"#13,'Body','SweptSolid',(#7006)", "#13,'Body-FallBack','Brep',(#7006)", CURVE}, "101", "b"},
+        {{"#13,'Body','SweptSolid',(#7006)", "#13,'Clearance','Brep',(#1060)", CURVE}, "101", "b"},
+        {{"#13,'Body','SweptSolid',(#7006)", "#13,'Body','Brep',(#1060)", CURVE}, "111", "b"},
+        {{"#7010,'Body','SweptSolid',(#7006)", "#7011,'Body','Brep',(#1060)", CURVE}, "011", "bl"},
+        /* Curves and dimensions of IFC2x3 are no bodies. */
+        {{"#13,'Body','GeometricSet',(#7035)", "#13,'Facetation','Brep',(#1060)", CURVE}, "111", "b"},
+        {{"#13,'FootPrint','GeometricSet',(#7035)", "#13,'Plan','Curve2D',(#7030,#7032,#7033,#7034)", CURVE},
+         "111",
+         ""},
         /* Levels of detail. */
         {{"#7011,'Body','Brep',(#1060)", "#7010,'Body','Brep',(#1060)", "#7010,'Axis','Curve3D',(#7000)"}, "011", "bl"},
         {{"#7012,'Body','Brep',(#1060)", "#7013,'Body','Brep',(#1060)", "#7011,'Body','Brep',(#1060)"}, "010", "bl"},

@@ -61,6 +61,53 @@ static const char *const thin[] = {
     "IFCPROJECTIONCURVE",
     "IFCTERMINATORSYMB",
     "IFCDRAUGHTINGCALL",
+    "IFC2DCOMPOSITECURVE",
+    "IFCBEZIERCURVE",
+    "IFCRATIONALBEZIERCURVE",
+    "IFCALIGNMENTCURVE",
+    "IFCLINEARDIMENSION",
+    "IFCANGULARDIMENSION",
+    "IFCRADIUSDIMENSION",
+    "IFCDIAMETERDIMENSION",
+    "IFCSTRUCTUREDDIMENSIONC",
+    "IFCFILLAREASTYLE",
+    "IFCCIRCULARARCSEG",
+    "IFCTRANSITIONCURVESEG",
+    "IFCONEDIRECTIONREPEAT",
+    "IFCTWODIRECTIONREPEAT",
+};
+
+/* Types with a surface that web-ifc or ifc-lite builds. */
+static const char *const built[] = {
+    "IFCEXTRUDEDAREASOLID",
+    "IFCEXTRUDEDAREASOLIDTAPERED",
+    "IFCREVOLVEDAREASOLID",
+    "IFCREVOLVEDAREASOLIDTAPERED",
+    "IFCFIXEDREFERENCESWEPTAREASOLID",
+    "IFCSURFACECURVESWEPTAREASOLID",
+    "IFCSWEPTDISKSOLID",
+    "IFCSECTIONEDSOLIDHORIZONTAL",
+    "IFCFACETEDBREP",
+    "IFCFACETEDBREPWITHVOIDS",
+    "IFCADVANCEDBREP",
+    "IFCADVANCEDBREPWITHVOIDS",
+    "IFCFACEBASEDSURFACEMODEL",
+    "IFCSHELLBASEDSURFACEMODEL",
+    "IFCCSGSOLID",
+    "IFCBLOCK",
+    "IFCSPHERE",
+    "IFCRIGHTCIRCULARCYLINDER",
+    "IFCRIGHTCIRCULARCONE",
+    "IFCRECTANGULARPYRAMID",
+    "IFCBOOLEANRESULT",
+    "IFCBOOLEANCLIPPINGRESULT",
+    "IFCTRIANGULATEDFACESET",
+    "IFCTRIANGULATEDIRREGULARNETWORK",
+    "IFCPOLYGONALFACESET",
+    "IFCOPENSHELL",
+    "IFCCLOSEDSHELL",
+    "IFCCONNECTEDFACESET",
+    NULL,
 };
 
 static bool is_thin(struct text_span type)
@@ -95,7 +142,8 @@ static int look_at(struct ifc_items *items, const struct step_record *item, int 
     }
     if (text_is(item->type, "IFCGEOMETRICSET")) return look_once(items, item, false, depth);
     if (text_is(item->type, "IFCBOUNDINGBOX")) return HAS_BOX;
-    return is_thin(item->type) ? 0 : HAS_BODY;
+    if (is_thin(item->type)) return 0;
+    return text_is_one_of(item->type, built) ? HAS_BODY : HAS_UNKNOWN;
 }
 
 static int look_at_list(struct ifc_items *items, struct text_span list, int depth)
@@ -123,6 +171,11 @@ void ifc_items_close(struct ifc_items *items)
 int ifc_items_of_list(struct ifc_items *items, struct text_span list)
 {
     return look_at_list(items, list, 0);
+}
+
+int ifc_items_of(struct ifc_items *items, const struct step_record *item)
+{
+    return look_at(items, item, 0);
 }
 
 const struct step_record *ifc_items_mapped(const struct ifc_items *items, const struct step_record *item)

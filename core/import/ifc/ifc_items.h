@@ -8,8 +8,8 @@
 /* IfcShapeRepresentation(ContextOfItems, RepresentationIdentifier, RepresentationType, Items) */
 enum { REP_CONTEXT = 0, REP_NAME = 1, REP_ITEMS = 3, REP_ARGS };
 
-/* The kinds of items that count. */
-enum { HAS_BOX = 1, HAS_BODY = 2 };
+/* The kinds of items that count: boxes, bodies of a type that no reader is known to build, and bodies. */
+enum { HAS_BOX = 1, HAS_UNKNOWN = 2, HAS_BODY = 4 };
 
 struct ifc_items {
     const struct ifc_index *index;
@@ -23,6 +23,7 @@ void ifc_items_close(struct ifc_items *items);
 /* Returns the kinds that a list of references has: 0, or a sum. Each mapped representation, and each
  * set, is looked at once, however often it is mapped. */
 int ifc_items_of_list(struct ifc_items *items, struct text_span list);
+int ifc_items_of(struct ifc_items *items, const struct step_record *item); /* the same for one item */
 
 /* The representation that an IfcMappedItem maps; NULL: the item is no such item, or maps nothing. */
 const struct step_record *ifc_items_mapped(const struct ifc_items *items, const struct step_record *item);

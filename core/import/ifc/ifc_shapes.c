@@ -64,16 +64,36 @@ struct shape {
     bool has_body, is_boxed, is_unbodied, is_level;
 };
 
-/* A representation without a name has that of the representation which its first item maps. */
-static struct text_span name_of(const struct ifc_items *items, const struct text_span arg[REP_ARGS])
+static int rank_of(struct text_span name, bool *is_known)
 {
-    struct text_span inner[REP_ARGS];
+    for (size_t i = 0; i < sizeof ranks / sizeof ranks[0]; i++) {
+        *is_known = name.n == strlen(ranks[i].name) && strncasecmp(name.p, ranks[i].name, name.n) == 0;
+        if (*is_known) return ranks[i].rank;
+    }
+    return FACETS; /* IFC doesn't define every name */
+}
+
+/* A representation without a name has that of a representation which it maps, where that is a body. Of several, the
+ * best rank counts, since the items stay together or not at all. An item of its own has no name. */
+static struct text_span name_of(struct ifc_items *items, const struct text_span arg[REP_ARGS])
+{
+    struct text_span inner[REP_ARGS], best = arg[REP_NAME];
     const char *p = arg[REP_ITEMS].p, *end = p + arg[REP_ITEMS].n;
-    uint64_t id;
-    if (arg[REP_NAME].n > 2 || !ifc_next_reference(&p, end, &id)) return arg[REP_NAME];
-    const struct step_record *item = ifc_index_find(items->index, id);
-    const struct step_record *rep = item != NULL ? ifc_items_mapped(items, item) : NULL;
-    return rep != NULL && step_split(rep->args, inner, REP_ARGS) == REP_ARGS ? inner[REP_NAME] : arg[REP_NAME];
+    int most = -1;
+    if (best.n > 2) return best;
+    for (uint64_t id; most < BODY && ifc_next_reference(&p, end, &id);) {
+        const struct step_record *item = ifc_index_find(items->index, id), *rep;
+        if (item == NULL || ifc_items_of(items, item) < HAS_UNKNOWN) continue;
+        rep = ifc_items_mapped(items, item);
+        const bool has_name = rep != NULL && step_split(rep->args, inner, REP_ARGS) == REP_ARGS;
+        const struct text_span name = has_name ? inner[REP_NAME] : arg[REP_NAME];
+        bool is_known;
+        const int rank = rank_of(name, &is_known);
+        if (rank <= most) continue;
+        most = rank;
+        best = name;
+    }
+    return best;
 }
 
 static void read_view(const struct ifc_index *x, struct text_span context, struct rep *rep)
@@ -97,12 +117,7 @@ static void read_rep(struct ifc_items *items, struct text_span reference, struct
     const struct step_record *record = step_reference(reference, &id) ? ifc_index_find(items->index, id) : NULL;
     if (record == NULL || step_split(record->args, arg, REP_ARGS) != REP_ARGS) return;
     rep->name = name_of(items, arg);
-    rep->rank = FACETS; /* IFC doesn't define every name */
-    for (size_t i = 0; i < sizeof ranks / sizeof ranks[0]; i++) {
-        if (rep->name.n != strlen(ranks[i].name) || strncasecmp(rep->name.p, ranks[i].name, rep->name.n) != 0) continue;
-        rep->rank = ranks[i].rank;
-        rep->is_known = true;
-    }
+    rep->rank = rank_of(rep->name, &rep->is_known);
     rep->has = ifc_items_of_list(items, arg[REP_ITEMS]);
     read_view(items->index, arg[REP_CONTEXT], rep);
 }
@@ -135,43 +150,59 @@ static bool is_same_view(const struct rep *a, const struct rep *b)
            memcmp(a->user_view.p, b->user_view.p, a->user_view.n) == 0;
 }
 
+/* A view that a reader builds is better than one of a type that no reader is known to build. */
+static bool is_better_view(const struct rep *a, const struct rep *b)
+{
+    const int builds = (a->has >= HAS_BODY) - (b->has >= HAS_BODY);
+    if (builds != 0) return builds > 0;
+    return a->view < b->view || (a->view == b->view && a->scale > b->scale);
+}
+
 /* Where bodies of one name are for several views, the best view stays: the model's, and that of the largest scale.
  * Bodies of one name and one view are parts of one body. */
 static void choose_views(struct shape *s)
 {
     for (size_t i = 0; i < s->n; i++) {
         const struct rep *best = &s->rep[i];
-        if (!best->is_kept || best->has < HAS_BODY) continue;
+        if (!best->is_kept || best->has < HAS_UNKNOWN) continue;
         for (size_t k = 0; k < s->n; k++) {
             const struct rep *rep = &s->rep[k];
-            if (!rep->is_kept || rep->has < HAS_BODY || !is_same_name(rep, best)) continue;
-            if (rep->view < best->view || (rep->view == best->view && rep->scale > best->scale)) best = rep;
+            if (rep->is_kept && rep->has >= HAS_UNKNOWN && is_same_name(rep, best) && is_better_view(rep, best))
+                best = rep;
         }
         for (size_t k = 0; k < s->n; k++) {
             struct rep *rep = &s->rep[k];
-            if (rep->has < HAS_BODY || !is_same_name(rep, best) || is_same_view(rep, best)) continue;
+            if (rep->has < HAS_UNKNOWN || !is_same_name(rep, best) || is_same_view(rep, best)) continue;
             rep->is_kept = false;
             s->is_level = true;
         }
     }
 }
 
+/* Returns the best rank of the representations whose items are at least of this kind. */
+static int best_rank(const struct shape *s, int least)
+{
+    int best = NO_BODY;
+    for (size_t i = 0; i < s->n; i++)
+        if (s->rep[i].has >= least && s->rep[i].rank > best) best = s->rep[i].rank;
+    return best;
+}
+
 static void choose_reps(struct shape *s)
 {
-    int best = NO_BODY, has = 0;
-    for (size_t i = 0; i < s->n; i++) {
-        has |= s->rep[i].has;
-        if (s->rep[i].has >= HAS_BODY && s->rep[i].rank > best) best = s->rep[i].rank;
-    }
+    /* A Body that no reader builds gives way to another one, such as a Body-FallBack. */
+    int best = best_rank(s, HAS_BODY), has = 0;
+    if (best == NO_BODY) best = best_rank(s, HAS_UNKNOWN);
     for (size_t i = 0; i < s->n; i++) {
         struct rep *rep = &s->rep[i];
-        if (rep->has < HAS_BODY) continue; /* neither reader builds it */
+        has |= rep->has;
+        if (rep->has < HAS_UNKNOWN) continue; /* neither reader builds it */
         rep->is_kept = !rep->is_known || (rep->rank == best && best > NO_BODY);
     }
     choose_views(s);
     s->has_body = best > NO_BODY;
     s->is_boxed = has == HAS_BOX;
-    s->is_unbodied = best == NO_BODY && has >= HAS_BODY;
+    s->is_unbodied = best == NO_BODY && has >= HAS_UNKNOWN;
 }
 
 static bool take_out(struct ifc_index *x, const struct shape *s, struct ifc_edits *edits)
