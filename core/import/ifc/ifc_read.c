@@ -112,14 +112,20 @@ static const struct ifc_body *with_parts(const struct ifc_bodies *bodies, bool h
     return body != NULL && body->n_parts > 0 ? body : NULL;
 }
 
+/* The findings that need the records alone, of products that are air too. */
+static int finding_of_records(const struct ifc_product *p)
+{
+    if (p->opens_nothing) return IFC_UNCUT;
+    return p->is_analysis && (p->has_body || p->is_unbodied) ? IFC_ANALYSIS : IFC_AGREED;
+}
+
 static int add_products(struct reading *r)
 {
     const struct ifc_readings *in = &r->readings;
     int rc = SH_OK;
     for (size_t i = 0; i < r->records.n_products && rc == SH_OK; i++) {
         struct ifc_product *p = &r->records.product[i];
-        if (p->opens_nothing) p->finding = IFC_UNCUT;
-        if (p->is_analysis && p->has_body) p->finding = IFC_ANALYSIS;
+        p->finding = finding_of_records(p);
         if (p->is_air) continue;
         const struct ifc_body *web = with_parts(&in->web, in->has_web, p->id),
                               *lite = with_parts(&in->lite, in->has_lite, p->id);
