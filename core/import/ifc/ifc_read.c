@@ -219,6 +219,17 @@ static int read_by_two(struct reading *r)
     return rc;
 }
 
+/* Assimp's bodies are not compared, so these findings need no reader. */
+static int say_records(struct reading *r)
+{
+    for (size_t i = 0; i < r->records.n_products; i++) {
+        struct ifc_product *p = &r->records.product[i];
+        p->finding = finding_of_records(p);
+        if (!p->is_air && !p->has_body) p->finding = (int)ifc_choose(p, NULL, NULL, false).finding;
+    }
+    return ifc_say_findings(r->b, r->records.product, r->records.n_products, false, r->err);
+}
+
 static int read_by_assimp(struct reading *r, const char *why)
 {
     const bool asked = r->limits.ifc_reader == IFC_READER_ASSIMP;
@@ -226,10 +237,11 @@ static int read_by_assimp(struct reading *r, const char *why)
         return build_fail(r->b, SH_EINPUT, r->err,
                           "%s, so nothing is cross-checked, but scene.ifc_strict demands both readers", why);
     if (!asked) build_warn(r->b, "%s: Assimp reads it", why);
-    const int rc = ifc_say_assimp(r->b, r->records.product, r->records.n_products, !asked, why, r->err);
+    int rc = ifc_say_assimp(r->b, r->records.product, r->records.n_products, !asked, why, r->err);
+    if (rc == SH_OK) rc = say_records(r);
     if (rc != SH_OK) return rc;
-    /* The records' text lacks the representations that are no body. */
-    if (r->records.edits.n > 0)
+    /* The records' text lacks the representations that are no body, and those of analysis members. */
+    if (ifc_records_hide_analysis(&r->records) || r->records.edits.n > 0)
         r->b->instead = (struct text_span){r->records.index.text.data, r->records.index.text.size};
     const int read = import_apart(r->b, r->err);
     r->b->instead = (struct text_span){NULL, 0};
