@@ -215,7 +215,7 @@ static int fail_by_addresses(const struct import_apart *a, const char *how, bool
                       " leaves it %llu MiB of addresses, which may be too little: lift that "
                       "limit%s",
                       a->task.name, how, (unsigned long long)limit_mib,
-                      !is_sure && limit_mib > LARGE_LIMIT_MIB ? "; the file may be broken as well" : "");
+                      !is_sure && limit_mib > LARGE_LIMIT_MIB ? "; the file may be broken" : "");
 }
 
 /* "memory access out of bounds" of WebAssembly is no lack of memory. */
