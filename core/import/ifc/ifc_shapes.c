@@ -79,12 +79,15 @@ static struct text_span name_of(struct ifc_items *items, const struct text_span 
 {
     struct text_span inner[REP_ARGS], best = arg[REP_NAME];
     const char *p = arg[REP_ITEMS].p, *end = p + arg[REP_ITEMS].n;
+    const struct step_record *last = NULL; /* often all items map one, which may be long */
     int most = -1;
     if (best.n > 2) return best;
     for (uint64_t id; most < BODY && ifc_next_reference(&p, end, &id);) {
         const struct step_record *item = ifc_index_find(items->index, id), *rep;
         if (item == NULL || ifc_items_of(items, item) < HAS_UNKNOWN) continue;
         rep = ifc_items_mapped(items, item);
+        if (rep != NULL && rep == last) continue;
+        last = rep;
         const bool has_name = rep != NULL && step_split(rep->args, inner, REP_ARGS) == REP_ARGS;
         const struct text_span name = has_name ? inner[REP_NAME] : arg[REP_NAME];
         bool is_known;
