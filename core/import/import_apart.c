@@ -191,6 +191,8 @@ void import_watch(struct import_apart *const a[], size_t n)
     }
 }
 
+enum { LARGE_LIMIT_MIB = 64 << 10 };
+
 /* Returns the address space that a limit of the user (`ulimit -v`) leaves to the process, in MiB. 0: there is no such
  * limit, or it is above that of import_child.c. A program that reads has the user's limit alone. */
 static uint64_t user_limit_mib(const struct import_apart *a)
@@ -203,19 +205,31 @@ static uint64_t user_limit_mib(const struct import_apart *a)
     return most >> 20 > 0 ? most >> 20 : 1;
 }
 
-/* how: the way in which it ended. The file may be a good one. */
-static int fail_by_addresses(const struct import_apart *a, const char *how, struct sh_err *err)
+/* how: the way in which it ended. The file may be a good one. Few readers need more addresses than LARGE_LIMIT_MIB: where
+ * is_sure is false, the file may be the cause then. */
+static int fail_by_addresses(const struct import_apart *a, const char *how, bool is_sure, struct sh_err *err)
 {
+    const uint64_t limit_mib = user_limit_mib(a);
     return build_fail(a->task.b, SH_EINPUT, err,
                       "%s %s; " IMPORT_USER_LIMIT
                       " leaves it %llu MiB of addresses, which may be too little: lift that "
-                      "limit",
-                      a->task.name, how, (unsigned long long)user_limit_mib(a));
+                      "limit%s",
+                      a->task.name, how, (unsigned long long)limit_mib,
+                      !is_sure && limit_mib > LARGE_LIMIT_MIB ? "; the file may be broken" : "");
+}
+
+/* "memory access out of bounds" of WebAssembly is no lack of memory. */
+static bool is_lack_of_memory(const char *said)
+{
+    static const char *const words[] = {"out of memory", "allocation failed", "could not allocate", "cannot allocate"};
+    for (size_t i = 0; i < sizeof words / sizeof words[0]; i++)
+        if (strcasestr(said, words[i]) != NULL) return true;
+    return false;
 }
 
 static int fail_by_memory(const struct import_apart *a, struct sh_err *err)
 {
-    if (user_limit_mib(a) > 0) return fail_by_addresses(a, "ran out of memory", err);
+    if (user_limit_mib(a) > 0) return fail_by_addresses(a, "ran out of memory", true, err);
     return build_fail(
         a->task.b, SH_EINPUT, err,
         "%s needs more than %u MiB to read it (scene.import_memory_mib): raise that where the mesh needs more; a "
@@ -250,7 +264,7 @@ static int fail_by_signal(const struct import_apart *a, int number, struct sh_er
     if (user_limit_mib(a) > 0) {
         char how[48];
         snprintf(how, sizeof how, "crashed (SIG%s)", name != NULL ? name : "?");
-        return fail_by_addresses(a, how, err);
+        return fail_by_addresses(a, how, false, err);
     }
     return build_fail(a->task.b, SH_EINPUT, err,
                       "%s crashed while it read the file (SIG%s): the file is broken, or %s has a fault "
@@ -268,11 +282,11 @@ int import_judge(struct import_apart *a, struct sh_err *err)
     if (WIFSIGNALED(a->status)) return fail_by_signal(a, WTERMSIG(a->status), err);
     /* A request larger than all memory is refused at once, and never counts as memory in use. */
     if (a->said.code == SH_ENOMEM || strstr(a->said.text, "bad_alloc") != NULL) return fail_by_memory(a, err);
-    if (strcasestr(a->said.text, "memory") != NULL && user_limit_mib(a) > 0)
-        return fail_by_addresses(a, "ran out of memory", err);
+    if (is_lack_of_memory(a->said.text) && user_limit_mib(a) > 0)
+        return fail_by_addresses(a, "ran out of memory", true, err);
     if (a->said.code != 0) return sh_fail(err, a->said.code, "%s", a->said.text);
     if (WEXITSTATUS(a->status) == 0) return SH_OK;
-    if (user_limit_mib(a) > 0) return fail_by_addresses(a, "ended without a message", err);
+    if (user_limit_mib(a) > 0) return fail_by_addresses(a, "ended without a message", false, err);
     return build_fail(a->task.b, SH_EINPUT, err,
                       "the process in which %s read it ended without a message (exit status %d): the file is "
                       "broken: " IMPORT_ELSE_CONVERT,

@@ -178,16 +178,21 @@ static void only_the_body_is_read(void **state)
         "#5013=IFCRELCONTAINEDINSPATIALSTRUCTURE('guid_of_relation_00005',#5,$,$,(#5012),#20);\n"
         "#5014=IFCPRODUCTDEFINITIONSHAPE($,$,(#5006));\n"
         "#5015=IFCBOILER('guid_of_product__00002',#5,'space',$,$,#1003,#5014,$,$);\n"
-        "#5016=IFCRELCONTAINEDINSPATIALSTRUCTURE('guid_of_relation_00006',#5,$,$,(#5015,#5017),#20);\n"
-        "#5017=IFCSTRUCTURALSURFACEMEMBER('guid_of_product__00003',#5,'plate',$,$,#1003,#1002,.SHELL.,0.2);\n");
+        "#5016=IFCRELCONTAINEDINSPATIALSTRUCTURE('guid_of_relation_00006',#5,$,$,(#5015,#5017,#5018),#20);\n"
+        "#5017=IFCSTRUCTURALSURFACEMEMBER('guid_of_product__00003',#5,'plate',$,$,#1003,#1002,.SHELL.,0.2);\n"
+        /* The form of IFC 4: a member's representation is a Reference of faces. */
+        "#5018=IFCSTRUCTURALSURFACEMEMBER('guid_of_product__00004',#5,'face',$,$,#1003,#5019,.SHELL.,0.2);\n"
+        "#5019=IFCPRODUCTDEFINITIONSHAPE($,$,(#5020));\n#5020=IFCTOPOLOGYREPRESENTATION(#13,'Reference','Face',(#5021));\n"
+        "#5021=IFCFACESURFACE((),#5022,.T.);\n#5022=IFCPLANE(#12);\n");
     must_read(1e-3);
     double area, volume;
     measure(1, &area, &volume);
     assert_true(fabs(area - 28) < 28e-6 && fabs(volume - 8) < 8e-6);
     assert_int_equal(scene->n_surfaces, 2);
     assert_int_equal(n_warnings, 3);
-    if (strstr(warnings, "1 product: part of an analysis model, not of the building, so it is not in the scene: "
-                         "IFCSTRUCTURALSURFACEMEMBER 'plate' guid_of_product__00003") == NULL)
+    if (strstr(warnings, "2 products: part of an analysis model, not of the building, so it is not in the scene: "
+                         "IFCSTRUCTURALSURFACEMEMBER 'plate' guid_of_product__00003, "
+                         "IFCSTRUCTURALSURFACEMEMBER 'face' guid_of_product__00004") == NULL)
         fail_msg("%s", warnings);
     if (strstr(warnings, "1 product: with bodies for several views or scales: that for the most detailed one is used: "
                          "IFCBOILER 'boiler' guid_of_product__00001") == NULL ||

@@ -25,6 +25,11 @@ static const char common[] =
     "#7022=IFCMAPPEDITEM(#7021,#12);\n"
     "#7023=IFCSHAPEREPRESENTATION(#13,'Clearance','SweptSolid',(#1060));\n#7024=IFCREPRESENTATIONMAP(#12,#7023);\n"
     "#7025=IFCMAPPEDITEM(#7024,#12);\n#7026=IFCGEOMETRICSET((#7026,#7026));\n"
+    "#7027=IFCSHAPEREPRESENTATION(#13,'FootPrint','Curve2D',(#7000));\n#7028=IFCREPRESENTATIONMAP(#12,#7027);\n"
+    "#7029=IFCMAPPEDITEM(#7028,#12);\n#7030=IFC2DCOMPOSITECURVE((#7031),.U.);\n"
+    "#7031=IFCCOMPOSITECURVESEGMENT(.CONTINUOUS.,.T.,#7000);\n#7032=IFCBEZIERCURVE(1,(#9,#9),.UNSPECIFIED.,.F.,.F.);\n"
+    "#7033=IFCRATIONALBEZIERCURVE(1,(#9,#9),.UNSPECIFIED.,.F.,.F.,(1.,1.));\n"
+    "#7034=IFCLINEARDIMENSION((#7000));\n#7035=IFCGEOMETRICSET((#7030,#7032,#7033,#7034));\n"
     "#6100=IFCPRODUCTDEFINITIONSHAPE($,$,(#6000, #6001\n,#6002));\n"
     "#6101=IFCWALL('guid_of_wall',#5,'wall',$,$,#1003,#6100,$,$);\n"
     "#6102=IFCWALL('guid_of_other',#5,'other',$,$,#1003,#6100,$,$);\n";
@@ -129,6 +134,26 @@ static void bodies_are_chosen(void **state)
         {{"#13,$,'MappedRepresentation',(#7022)", "#13,$,'MappedRepresentation',(#7025)", CURVE}, "101", "b"},
         {{"#13,'Body','MappedRepresentation',(#7025)", CURVE, CURVE}, "111", "b"},
         {{"#13,'Clearance','SweptSolid',(#1060)", "#13,'Profile','SweptSolid',(#1060)", CURVE}, "001", "u"},
+        /* It may map several: the best that is a body counts. */
+        {{"#13,$,'MappedRepresentation',(#7029,#7022)", "#13,'Box','SweptSolid',(#1060)", CURVE}, "101", "b"},
+        {{"#13,$,'MappedRepresentation',(#7025,#7022)", "#13,'','MappedRepresentation',(#7025,#7029)", CURVE},
+         "101",
+         "b"},
+        {{"#13,$,'MappedRepresentation',(#7029,#7025)", "#13,'Body','SweptSolid',(#1060)", CURVE}, "011", "b"},
+        /* A body of a type that no reader is known to build takes nothing else out. */
+        {{"#13,'Body','SweptSolid',(#7006)", "#13,'Body-FallBack','Brep',(#1060)", CURVE}, "011", "b"},
+        {{"#13,'Body','SweptSolid',(#7006)", "#13,'Facetation','Brep',(#1060)", "#13,'Clearance','Brep',(#1060)"},
+         "010",
+         "b"},
+        {{"#13,'Body','SweptSolid',(#7006)", "#13,'Body-FallBack','Brep',(#7006)", CURVE}, "101", "b"},
+        {{"#13,'Body','SweptSolid',(#7006)", "#13,'Clearance','Brep',(#1060)", CURVE}, "101", "b"},
+        {{"#13,'Body','SweptSolid',(#7006)", "#13,'Body','Brep',(#1060)", CURVE}, "111", "b"},
+        {{"#7010,'Body','SweptSolid',(#7006)", "#7011,'Body','Brep',(#1060)", CURVE}, "011", "bl"},
+        /* Curves and dimensions of IFC2x3 are no bodies. */
+        {{"#13,'Body','GeometricSet',(#7035)", "#13,'Facetation','Brep',(#1060)", CURVE}, "111", "b"},
+        {{"#13,'FootPrint','GeometricSet',(#7035)", "#13,'Plan','Curve2D',(#7030,#7032,#7033,#7034)", CURVE},
+         "111",
+         ""},
         /* Levels of detail. */
         {{"#7011,'Body','Brep',(#1060)", "#7010,'Body','Brep',(#1060)", "#7010,'Axis','Curve3D',(#7000)"}, "011", "bl"},
         {{"#7012,'Body','Brep',(#1060)", "#7013,'Body','Brep',(#1060)", "#7011,'Body','Brep',(#1060)"}, "010", "bl"},
@@ -165,6 +190,35 @@ static void marks_are_those_of_the_body(void **state)
     const struct ifc_product *p = ifc_records_product(&records, 6101);
     assert_true(!p->is_curved && !p->is_far && records.radius_m == 0.0);
     ifc_records_close(&records);
+}
+
+/* A representation maps another one 16 times, and that likewise, 12 deep, and the last maps itself: 16 to the power of
+ * 12 ways lead through them. Each is looked at once. The body stands at the end. */
+static void mapped_ways_are_not_counted(void **state)
+{
+    (void)state;
+    enum { DEPTH = 12, FAN = 16 };
+    static char more[1 << 14];
+    for (int has = 0; has < 2; has++) {
+        size_t n = (size_t)snprintf(more, sizeof more, "#7999=IFCPOLYLINE((#9,#9));\n");
+        for (int i = 0; i < DEPTH; i++) {
+            const int id = 8000 + 100 * i, to = i + 1 < DEPTH ? id + 100 : id;
+            n += (size_t)snprintf(more + n, sizeof more - n, "#%d=IFCREPRESENTATIONMAP(#12,#%d);\n", id, id + 1);
+            n += (size_t)snprintf(more + n, sizeof more - n, "#%d=IFCSHAPEREPRESENTATION(#13,'Body','Any',(", id + 1);
+            for (int k = 0; k < FAN; k++)
+                n += (size_t)snprintf(more + n, sizeof more - n, "#%d,", id + 2 + k);
+            n += (size_t)snprintf(more + n, sizeof more - n, "#%s));\n", has && i + 1 == DEPTH ? "1060" : "7999");
+            for (int k = 0; k < FAN; k++)
+                n += (size_t)snprintf(more + n, sizeof more - n, "#%d=IFCMAPPEDITEM(#%d,#12);\n", id + 2 + k, to);
+        }
+        snprintf(more + n, sizeof more - n,
+                 "#9900=IFCPRODUCTDEFINITIONSHAPE($,$,(#8001));\n"
+                 "#9901=IFCWALL('guid_of_fan',#5,'fan',$,$,#1003,#9900,$,$);\n");
+        ifc_write_text(text, "IFC4", NULL, NULL, ifc_shapes, 1, more);
+        open_text();
+        assert_int_equal(ifc_records_product(&records, 9901)->has_body, has);
+        ifc_records_close(&records);
+    }
 }
 
 /* An analysis model has the shapes of the building a second time, and loads. */
@@ -232,6 +286,27 @@ static void indexed_points_become_a_list(void **state)
     }
 }
 
+/* Face sets use more lists in turn than are kept: list k has the point k alone. */
+static void lists_in_turn_keep_apart(void **state)
+{
+    (void)state;
+    enum { LISTS = 6, TURNS = 2 };
+    char more[2048], want[128];
+    size_t n = 0;
+    for (int k = 0; k < LISTS; k++)
+        n += (size_t)snprintf(more + n, sizeof more - n, "#%d=IFCCARTESIANPOINTLIST3D(((%d.,0.,0.))%s);\n", 7000 + k, k,
+                              k % 2 ? ",$" : "");
+    for (int i = 0; i < LISTS * TURNS; i++)
+        n += (size_t)snprintf(more + n, sizeof more - n, "#%d=IFCTRIANGULATEDFACESET(#%d,$,$,((1,1,1)),(1));\n",
+                              7100 + i, 7000 + i % LISTS);
+    add_records(more);
+    for (int i = 0; i < LISTS * TURNS; i++) {
+        snprintf(want, sizeof want, "=IFCCARTESIANPOINTLIST3D(((%d.,0.,0.))%s);#%d=IFCTRIANGULATEDFACESET(", i % LISTS,
+                 i % LISTS % 2 ? ",$" : "", 7100 + i);
+        has_edited(want);
+    }
+}
+
 static void index_without_a_point_is_refused(void **state)
 {
     (void)state;
@@ -283,8 +358,10 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(bodies_are_chosen),
         cmocka_unit_test(marks_are_those_of_the_body),
+        cmocka_unit_test(mapped_ways_are_not_counted),
         cmocka_unit_test(analysis_models_are_marked),
         cmocka_unit_test(indexed_points_become_a_list),
+        cmocka_unit_test(lists_in_turn_keep_apart),
         cmocka_unit_test(index_without_a_point_is_refused),
         cmocka_unit_test(holes_of_a_network_are_left_out),
     };

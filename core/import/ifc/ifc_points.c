@@ -25,11 +25,20 @@ struct parts {
     size_t n, room;
 };
 
+enum { KEPT_LISTS = 4 };
+
+/* The points of an IfcCartesianPointList3D. */
+struct coordinates {
+    const struct step_record *of; /* NULL: this has no list */
+    struct parts list;
+    bool has_tags;
+};
+
 struct points {
     struct ifc_index *x;
     struct ifc_edits *edits;
-    struct parts list; /* of the last record of points: face sets with a PnIndex often share one */
-    const struct step_record *of;
+    struct coordinates last[KEPT_LISTS]; /* face sets with a PnIndex often share a few lists */
+    size_t next;                         /* of these, it gives way to another list */
     uint64_t next_id;
     struct sh_err *err;
 };
@@ -61,52 +70,67 @@ static bool read_parts(struct text_span list, struct parts *parts)
     return true;
 }
 
+static struct coordinates *find_points(struct points *s, const struct step_record *of)
+{
+    for (size_t i = 0; of != NULL && i < KEPT_LISTS; i++)
+        if (s->last[i].of == of) return &s->last[i];
+    return NULL;
+}
+
 /* IfcCartesianPointList3D(CoordList); IFC 4.3 has a TagList after it. */
-static int read_points(struct points *s, const struct step_record *from, struct text_span reference)
+static int read_points(struct points *s, const struct step_record *from, struct text_span reference,
+                       const struct coordinates **points)
 {
     struct text_span arg[2], list;
     const struct step_record *of = ifc_index_follow(s->x, reference, "IFCCARTESIANPOINTLIST3D");
-    if (of == NULL || step_split(of->args, arg, 2) < 1 || !step_list(arg[0], &list))
+    *points = find_points(s, of);
+    if (*points != NULL) return SH_OK;
+    const size_t n = of != NULL ? step_split(of->args, arg, 2) : 0;
+    if (n < 1 || !step_list(arg[0], &list))
         return ifc_index_fail(s->x, from, s->err, "its Coordinates are no IFCCARTESIANPOINTLIST3D");
-    if (of == s->of) return SH_OK;
-    s->of = NULL;
-    if (!read_parts(list, &s->list)) return ifc_no_memory(s->x, s->err);
-    s->of = of;
+    struct coordinates *c = &s->last[s->next++ % KEPT_LISTS];
+    c->of = NULL;
+    if (!read_parts(list, &c->list)) return ifc_no_memory(s->x, s->err);
+    c->of = of;
+    c->has_tags = n > 1;
+    *points = c;
     return SH_OK;
 }
 
 /* Writes a record with the points in the order of PnIndex. */
-static int write_points(struct points *s, const struct step_record *from, struct text_span pn_index, FILE *out)
+static int write_points(struct points *s, const struct step_record *from, const struct coordinates *points,
+                        struct text_span pn_index, FILE *out)
 {
-    struct text_span arg[2], element;
+    struct text_span element;
     const char *p = pn_index.p, *end = p + pn_index.n;
     char what[128];
     long at;
     fprintf(out, "#%llu=IFCCARTESIANPOINTLIST3D((", (unsigned long long)s->next_id);
     for (size_t n = 0; next_element(&p, end, &element); n++) {
-        if (!step_integer(element, &at) || at < 1 || (size_t)at > s->list.n) {
+        if (!step_integer(element, &at) || at < 1 || (size_t)at > points->list.n) {
             snprintf(what, sizeof what, "PnIndex has %.*s; allowed 1 to %zu, the number of points of #%llu",
-                     element.n < 20 ? (int)element.n : 20, element.p, s->list.n, (unsigned long long)s->of->id);
+                     element.n < 20 ? (int)element.n : 20, element.p, points->list.n,
+                     (unsigned long long)points->of->id);
             return ifc_index_fail(s->x, from, s->err, what);
         }
-        const struct text_span *point = &s->list.part[at - 1];
+        const struct text_span *point = &points->list.part[at - 1];
         if (n > 0) fputc(',', out);
         fwrite(point->p, 1, point->n, out);
     }
-    fputs(step_split(s->of->args, arg, 2) > 1 ? "),$);" : "));", out);
+    fputs(points->has_tags ? "),$);" : "));", out);
     return SH_OK;
 }
 
 /* The face set refers to the new list, which stands before it, and has no PnIndex. */
-static int add_points(struct points *s, const struct step_record *face_set, const struct text_span *arg,
-                      size_t at_index, struct text_span pn_index)
+static int add_points(struct points *s, const struct step_record *face_set, const struct coordinates *points,
+                      const struct text_span *arg, size_t at_index, struct text_span pn_index)
 {
     const struct text *t = &s->x->text;
     char *record = NULL, *reference = NULL;
     size_t len;
     FILE *out = open_memstream(&record, &len);
     if (out == NULL) return ifc_no_memory(s->x, s->err);
-    const int rc = write_points(s, face_set, pn_index, out);
+    const int rc = write_points(s, face_set, points, pn_index, out);
     if (fclose(out) != 0 || rc != SH_OK) {
         free(record);
         return rc != SH_OK ? rc : ifc_no_memory(s->x, s->err);
@@ -131,8 +155,9 @@ static int resolve_index(struct points *s, const struct step_record *face_set, c
     if (s->next_id > UINT32_MAX)
         return ifc_index_fail(s->x, face_set, s->err,
                               "its PnIndex needs a record more, and the file has numbers up to 4294967295 or above");
-    const int rc = read_points(s, face_set, arg[COORDINATES]);
-    return rc == SH_OK ? add_points(s, face_set, arg, at_index, pn_index) : rc;
+    const struct coordinates *points;
+    const int rc = read_points(s, face_set, arg[COORDINATES], &points);
+    return rc == SH_OK ? add_points(s, face_set, points, arg, at_index, pn_index) : rc;
 }
 
 /* IFC 4.3: "applications should not display faces where flags are set as negative". */
@@ -172,6 +197,7 @@ int ifc_points_resolve(struct ifc_index *x, struct ifc_edits *edits, struct sh_e
     s.next_id = x->n > 0 ? x->record[x->n - 1].id + 1 : 1;
     for (size_t i = 0; i < x->n && rc == SH_OK; i++)
         rc = resolve_face_set(&s, &x->record[i]);
-    free(s.list.part);
+    for (size_t i = 0; i < KEPT_LISTS; i++)
+        free(s.last[i].list.part);
     return rc;
 }

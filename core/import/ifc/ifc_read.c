@@ -112,14 +112,20 @@ static const struct ifc_body *with_parts(const struct ifc_bodies *bodies, bool h
     return body != NULL && body->n_parts > 0 ? body : NULL;
 }
 
+/* The findings that need the records alone, of products that are air too. */
+static int finding_of_records(const struct ifc_product *p)
+{
+    if (p->opens_nothing) return IFC_UNCUT;
+    return p->is_analysis && (p->has_body || p->is_unbodied) ? IFC_ANALYSIS : IFC_AGREED;
+}
+
 static int add_products(struct reading *r)
 {
     const struct ifc_readings *in = &r->readings;
     int rc = SH_OK;
     for (size_t i = 0; i < r->records.n_products && rc == SH_OK; i++) {
         struct ifc_product *p = &r->records.product[i];
-        if (p->opens_nothing) p->finding = IFC_UNCUT;
-        if (p->is_analysis && p->has_body) p->finding = IFC_ANALYSIS;
+        p->finding = finding_of_records(p);
         if (p->is_air) continue;
         const struct ifc_body *web = with_parts(&in->web, in->has_web, p->id),
                               *lite = with_parts(&in->lite, in->has_lite, p->id);
@@ -213,6 +219,17 @@ static int read_by_two(struct reading *r)
     return rc;
 }
 
+/* Assimp's bodies are not compared, so these findings need no reader. */
+static int say_records(struct reading *r)
+{
+    for (size_t i = 0; i < r->records.n_products; i++) {
+        struct ifc_product *p = &r->records.product[i];
+        p->finding = finding_of_records(p);
+        if (!p->is_air && !p->has_body) p->finding = (int)ifc_choose(p, NULL, NULL, false).finding;
+    }
+    return ifc_say_findings(r->b, r->records.product, r->records.n_products, false, r->err);
+}
+
 static int read_by_assimp(struct reading *r, const char *why)
 {
     const bool asked = r->limits.ifc_reader == IFC_READER_ASSIMP;
@@ -220,10 +237,11 @@ static int read_by_assimp(struct reading *r, const char *why)
         return build_fail(r->b, SH_EINPUT, r->err,
                           "%s, so nothing is cross-checked, but scene.ifc_strict demands both readers", why);
     if (!asked) build_warn(r->b, "%s: Assimp reads it", why);
-    const int rc = ifc_say_assimp(r->b, r->records.product, r->records.n_products, !asked, why, r->err);
+    int rc = ifc_say_assimp(r->b, r->records.product, r->records.n_products, !asked, why, r->err);
+    if (rc == SH_OK) rc = say_records(r);
     if (rc != SH_OK) return rc;
-    /* The records' text lacks the representations that are no body. */
-    if (r->records.edits.n > 0)
+    /* The records' text lacks the representations that are no body, and those of analysis members. */
+    if (ifc_records_hide_analysis(&r->records) || r->records.edits.n > 0)
         r->b->instead = (struct text_span){r->records.index.text.data, r->records.index.text.size};
     const int read = import_apart(r->b, r->err);
     r->b->instead = (struct text_span){NULL, 0};

@@ -30,7 +30,7 @@ struct ifc_readings {
 bool ifc_readers_are_there(const struct scene_import_limits *limits, char *why, size_t size);
 
 /* Writes a reader's error with the reader's name, without the file's name and without advice. */
-enum { IFC_REASON_LEN = 150 };
+enum { IFC_REASON_LEN = 160 };
 void ifc_reason(const struct scene_build *b, const char *name, const struct sh_err *said, char out[IFC_REASON_LEN]);
 
 /* Runs the readers that are asked for, both at the same time. edits: changes to the file (ifc_edits_write). Fails where

@@ -102,6 +102,23 @@ int ifc_records_open(struct ifc_records *r, const char *path, struct sh_err *err
     return rc == SH_OK ? ifc_walk(r, err) : rc;
 }
 
+bool ifc_records_hide_analysis(struct ifc_records *r)
+{
+    struct text_span arg[PRODUCT_ARGS];
+    bool has = false;
+    for (size_t i = 0; i < r->n_products; i++) {
+        const struct ifc_product *p = &r->product[i];
+        const struct step_record *record = p->is_analysis ? ifc_index_find(&r->index, p->id) : NULL;
+        if (record == NULL || step_split(record->args, arg, PRODUCT_ARGS) < PRODUCT_ARGS) continue;
+        const struct text_span shape = arg[PRODUCT_SHAPE]; /* a reference, so it has a byte for the $ */
+        char *at = r->index.text.data + (shape.p - r->index.text.data);
+        memset(at, ' ', shape.n);
+        at[shape.n - 1] = '$';
+        has = true;
+    }
+    return has;
+}
+
 void ifc_records_close(struct ifc_records *r)
 {
     for (size_t i = 0; i < r->n_products; i++) {

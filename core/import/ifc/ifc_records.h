@@ -37,4 +37,7 @@ void ifc_records_close(struct ifc_records *r);
 /* NULL: there is none of that number. */
 const struct ifc_product *ifc_records_product(const struct ifc_records *r, uint64_t id);
 
+/* Takes the shapes from the members of analysis models in the index's text. Returns whether there was one. */
+bool ifc_records_hide_analysis(struct ifc_records *r);
+
 #endif

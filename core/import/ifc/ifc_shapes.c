@@ -4,20 +4,16 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/import/ifc/ifc_items.h"
 #include "core/import/ifc/ifc_product.h"
 
-enum { MAX_REPS = STEP_MAX_ARGS, MAX_DEPTH = 8 };
+enum { MAX_REPS = STEP_MAX_ARGS };
 
 /* IfcProductDefinitionShape(Name, Description, Representations) */
 enum { SHAPE_REPS = 2, SHAPE_ARGS };
-/* IfcShapeRepresentation(ContextOfItems, RepresentationIdentifier, RepresentationType, Items) */
-enum { REP_CONTEXT = 0, REP_NAME = 1, REP_ITEMS = 3, REP_ARGS };
 /* IfcGeometricRepresentationSubContext(ContextIdentifier, ContextType, *, *, *, *, ParentContext, TargetScale,
  * TargetView, UserDefinedTargetView) */
 enum { VIEW_SCALE = 7, VIEW_TARGET, VIEW_NAME, VIEW_ARGS };
-
-/* The kinds of items that count in a representation. */
-enum { HAS_BOX = 1, HAS_BODY = 2 };
 
 /* The representations of the best rank are the body. */
 enum { NO_BODY, SHEET, FALLBACK, FACETS, BODY };
@@ -51,60 +47,6 @@ static const char *const views[] = {".MODEL_VIEW.",     ".NOTDEFINED.", ".USERDE
                                     ".ELEVATION_VIEW.", ".PLAN_VIEW.",  ".REFLECTED_PLAN_VIEW."};
 enum { VIEWS = sizeof views / sizeof views[0], VIEW_NOT_DEFINED = 1 };
 
-/* Beginnings of the types of items that have no surface. */
-static const char *const thin[] = {
-    "IFCPOLYLINE",
-    "IFCINDEXEDPOLYCURVE",
-    "IFCTRIMMEDCURVE",
-    "IFCCOMPOSITECURVE",
-    "IFCGEOMETRICCURVESET",
-    "IFCBOUNDINGBOX",
-    "IFCCIRCLE",
-    "IFCELLIPSE",
-    "IFCLINE",
-    "IFCCARTESIANPOINT",
-    "IFCBSPLINECURVE",
-    "IFCRATIONALBSPLINEC",
-    "IFCANNOTATION",
-    "IFCTEXTLITERAL",
-    "IFCLIGHTSOURCE",
-    "IFCSTYLEDITEM",
-    "IFCPLANAREXTENT",
-    "IFCPLANARBOX",
-    "IFCPOINTON",
-    "IFCPOINTBY",
-    "IFCEDGE",
-    "IFCORIENTEDEDGE",
-    "IFCSUBEDGE",
-    "IFCVERTEX",
-    "IFCPOLYLOOP",
-    "IFCPATH",
-    "IFCOFFSETCURVE",
-    "IFCGRADIENTCURVE",
-    "IFCSEGMENTEDREF",
-    "IFCCURVESEGMENT",
-    "IFCPOLYNOMIALC",
-    "IFCCLOTHOID",
-    "IFCCOSINESPIRAL",
-    "IFCSINESPIRAL",
-    "IFCSECONDORDERPOLY",
-    "IFCTHIRDORDERPOLY",
-    "IFCSEVENTHORDERPOLY",
-    "IFCINTERSECTIONCURV",
-    "IFCSEAMCURVE",
-    "IFCPCURVE",
-    "IFCDEFINEDSYMBOL",
-    "IFCAXIS",
-    "IFCDIRECTION",
-    "IFCVECTOR",
-    "IFCBOUNDARYCURVE",
-    "IFCOUTERBOUNDARYC",
-    "IFCDIMENSIONCURVE",
-    "IFCPROJECTIONCURVE",
-    "IFCTERMINATORSYMB",
-    "IFCDRAUGHTINGCALL",
-};
-
 struct rep {
     struct text_span reference, name;
     int rank, has;
@@ -122,60 +64,39 @@ struct shape {
     bool has_body, is_boxed, is_unbodied, is_level;
 };
 
-static bool is_thin(struct text_span type)
+static int rank_of(struct text_span name, bool *is_known)
 {
-    for (size_t i = 0; i < sizeof thin / sizeof thin[0]; i++) {
-        const size_t n = strlen(thin[i]);
-        if (type.n >= n && memcmp(type.p, thin[i], n) == 0) return true;
+    for (size_t i = 0; i < sizeof ranks / sizeof ranks[0]; i++) {
+        *is_known = name.n == strlen(ranks[i].name) && strncasecmp(name.p, ranks[i].name, name.n) == 0;
+        if (*is_known) return ranks[i].rank;
     }
-    return text_is(type, "IFCSURFACECURVE"); /* IfcSurfaceCurveSweptAreaSolid is a body */
+    return FACETS; /* IFC doesn't define every name */
 }
 
-static const struct step_record *mapped(const struct ifc_index *x, const struct step_record *item)
+/* A representation without a name has that of a representation which it maps, where that is a body. Of several, the
+ * best rank counts, since the items stay together or not at all. An item of its own has no name. */
+static struct text_span name_of(struct ifc_items *items, const struct text_span arg[REP_ARGS])
 {
-    /* IfcMappedItem(MappingSource, MappingTarget), IfcRepresentationMap(MappingOrigin, MappedRepresentation) */
-    struct text_span arg[2];
-    uint64_t id;
-    if (step_split(item->args, arg, 2) != 2) return NULL;
-    const struct step_record *map = ifc_index_follow(x, arg[0], "IFCREPRESENTATIONMAP");
-    if (map == NULL || step_split(map->args, arg, 2) != 2 || !step_reference(arg[1], &id)) return NULL;
-    return ifc_index_find(x, id);
-}
-
-/* Looks at a list of items, and at those of mapped items and sets: HAS_BOX, HAS_BODY, both or 0. */
-static int look_at_items(const struct ifc_index *x, struct text_span items, int depth)
-{
-    const char *p = items.p, *end = p + items.n;
-    int has = 0;
-    for (uint64_t id; !(has & HAS_BODY) && ifc_next_reference(&p, end, &id);) {
-        const struct step_record *item = ifc_index_find(x, id), *rep;
-        struct text_span arg[REP_ARGS];
-        if (item == NULL) continue;
-        if (text_is(item->type, "IFCMAPPEDITEM")) {
-            rep = depth < MAX_DEPTH ? mapped(x, item) : NULL;
-            if (rep != NULL && step_split(rep->args, arg, REP_ARGS) == REP_ARGS)
-                has |= look_at_items(x, arg[REP_ITEMS], depth + 1);
-        } else if (text_is(item->type, "IFCGEOMETRICSET")) {
-            if (depth < MAX_DEPTH) has |= look_at_items(x, item->args, depth + 1);
-        } else if (text_is(item->type, "IFCBOUNDINGBOX")) {
-            has |= HAS_BOX;
-        } else if (!is_thin(item->type)) {
-            has |= HAS_BODY;
-        }
-    }
-    return has;
-}
-
-/* A representation without a name has that of the representation which its first item maps. */
-static struct text_span name_of(const struct ifc_index *x, const struct text_span arg[REP_ARGS])
-{
-    struct text_span inner[REP_ARGS];
+    struct text_span inner[REP_ARGS], best = arg[REP_NAME];
     const char *p = arg[REP_ITEMS].p, *end = p + arg[REP_ITEMS].n;
-    uint64_t id;
-    if (arg[REP_NAME].n > 2 || !ifc_next_reference(&p, end, &id)) return arg[REP_NAME];
-    const struct step_record *item = ifc_index_find(x, id);
-    const struct step_record *rep = item != NULL && text_is(item->type, "IFCMAPPEDITEM") ? mapped(x, item) : NULL;
-    return rep != NULL && step_split(rep->args, inner, REP_ARGS) == REP_ARGS ? inner[REP_NAME] : arg[REP_NAME];
+    const struct step_record *last = NULL; /* often all items map one, which may be long */
+    int most = -1;
+    if (best.n > 2) return best;
+    for (uint64_t id; most < BODY && ifc_next_reference(&p, end, &id);) {
+        const struct step_record *item = ifc_index_find(items->index, id), *rep;
+        if (item == NULL || ifc_items_of(items, item) < HAS_UNKNOWN) continue;
+        rep = ifc_items_mapped(items, item);
+        if (rep != NULL && rep == last) continue;
+        last = rep;
+        const bool has_name = rep != NULL && step_split(rep->args, inner, REP_ARGS) == REP_ARGS;
+        const struct text_span name = has_name ? inner[REP_NAME] : arg[REP_NAME];
+        bool is_known;
+        const int rank = rank_of(name, &is_known);
+        if (rank <= most) continue;
+        most = rank;
+        best = name;
+    }
+    return best;
 }
 
 static void read_view(const struct ifc_index *x, struct text_span context, struct rep *rep)
@@ -191,29 +112,24 @@ static void read_view(const struct ifc_index *x, struct text_span context, struc
     rep->user_view = arg[VIEW_NAME];
 }
 
-static void read_rep(const struct ifc_index *x, struct text_span reference, struct rep *rep)
+static void read_rep(struct ifc_items *items, struct text_span reference, struct rep *rep)
 {
     struct text_span arg[REP_ARGS];
     uint64_t id;
     *rep = (struct rep){.reference = reference, .is_kept = true, .user_view = {"", 0}};
-    const struct step_record *record = step_reference(reference, &id) ? ifc_index_find(x, id) : NULL;
+    const struct step_record *record = step_reference(reference, &id) ? ifc_index_find(items->index, id) : NULL;
     if (record == NULL || step_split(record->args, arg, REP_ARGS) != REP_ARGS) return;
-    rep->name = name_of(x, arg);
-    rep->rank = FACETS; /* IFC doesn't define every name */
-    for (size_t i = 0; i < sizeof ranks / sizeof ranks[0]; i++) {
-        if (rep->name.n != strlen(ranks[i].name) || strncasecmp(rep->name.p, ranks[i].name, rep->name.n) != 0) continue;
-        rep->rank = ranks[i].rank;
-        rep->is_known = true;
-    }
-    rep->has = look_at_items(x, arg[REP_ITEMS], 0);
-    read_view(x, arg[REP_CONTEXT], rep);
+    rep->name = name_of(items, arg);
+    rep->rank = rank_of(rep->name, &rep->is_known);
+    rep->has = ifc_items_of_list(items, arg[REP_ITEMS]);
+    read_view(items->index, arg[REP_CONTEXT], rep);
 }
 
 /* Returns whether the list could be read whole. */
-static bool read_shape(const struct ifc_index *x, uint64_t id, struct shape *s)
+static bool read_shape(struct ifc_items *items, uint64_t id, struct shape *s)
 {
     struct text_span arg[SHAPE_ARGS], reference[MAX_REPS];
-    const struct step_record *record = ifc_index_find(x, id);
+    const struct step_record *record = ifc_index_find(items->index, id);
     s->n = 0;
     s->has_body = s->is_boxed = s->is_unbodied = s->is_level = false;
     if (record == NULL || step_split(record->args, arg, SHAPE_ARGS) != SHAPE_ARGS ||
@@ -222,7 +138,7 @@ static bool read_shape(const struct ifc_index *x, uint64_t id, struct shape *s)
     const size_t n = step_split(s->list, reference, MAX_REPS);
     if (n > MAX_REPS) return false;
     for (s->n = 0; s->n < n; s->n++)
-        read_rep(x, reference[s->n], &s->rep[s->n]);
+        read_rep(items, reference[s->n], &s->rep[s->n]);
     return true;
 }
 
@@ -237,43 +153,59 @@ static bool is_same_view(const struct rep *a, const struct rep *b)
            memcmp(a->user_view.p, b->user_view.p, a->user_view.n) == 0;
 }
 
+/* A view that a reader builds is better than one of a type that no reader is known to build. */
+static bool is_better_view(const struct rep *a, const struct rep *b)
+{
+    const int builds = (a->has >= HAS_BODY) - (b->has >= HAS_BODY);
+    if (builds != 0) return builds > 0;
+    return a->view < b->view || (a->view == b->view && a->scale > b->scale);
+}
+
 /* Where bodies of one name are for several views, the best view stays: the model's, and that of the largest scale.
  * Bodies of one name and one view are parts of one body. */
 static void choose_views(struct shape *s)
 {
     for (size_t i = 0; i < s->n; i++) {
         const struct rep *best = &s->rep[i];
-        if (!best->is_kept || best->has < HAS_BODY) continue;
+        if (!best->is_kept || best->has < HAS_UNKNOWN) continue;
         for (size_t k = 0; k < s->n; k++) {
             const struct rep *rep = &s->rep[k];
-            if (!rep->is_kept || rep->has < HAS_BODY || !is_same_name(rep, best)) continue;
-            if (rep->view < best->view || (rep->view == best->view && rep->scale > best->scale)) best = rep;
+            if (rep->is_kept && rep->has >= HAS_UNKNOWN && is_same_name(rep, best) && is_better_view(rep, best))
+                best = rep;
         }
         for (size_t k = 0; k < s->n; k++) {
             struct rep *rep = &s->rep[k];
-            if (rep->has < HAS_BODY || !is_same_name(rep, best) || is_same_view(rep, best)) continue;
+            if (rep->has < HAS_UNKNOWN || !is_same_name(rep, best) || is_same_view(rep, best)) continue;
             rep->is_kept = false;
             s->is_level = true;
         }
     }
 }
 
+/* Returns the best rank of the representations whose items are at least of this kind. */
+static int best_rank(const struct shape *s, int least)
+{
+    int best = NO_BODY;
+    for (size_t i = 0; i < s->n; i++)
+        if (s->rep[i].has >= least && s->rep[i].rank > best) best = s->rep[i].rank;
+    return best;
+}
+
 static void choose_reps(struct shape *s)
 {
-    int best = NO_BODY, has = 0;
-    for (size_t i = 0; i < s->n; i++) {
-        has |= s->rep[i].has;
-        if (s->rep[i].has >= HAS_BODY && s->rep[i].rank > best) best = s->rep[i].rank;
-    }
+    /* A Body that no reader builds gives way to another one, such as a Body-FallBack. */
+    int best = best_rank(s, HAS_BODY), has = 0;
+    if (best == NO_BODY) best = best_rank(s, HAS_UNKNOWN);
     for (size_t i = 0; i < s->n; i++) {
         struct rep *rep = &s->rep[i];
-        if (rep->has < HAS_BODY) continue; /* neither reader builds it */
+        has |= rep->has;
+        if (rep->has < HAS_UNKNOWN) continue; /* neither reader builds it */
         rep->is_kept = !rep->is_known || (rep->rank == best && best > NO_BODY);
     }
     choose_views(s);
     s->has_body = best > NO_BODY;
     s->is_boxed = has == HAS_BOX;
-    s->is_unbodied = best == NO_BODY && has >= HAS_BODY;
+    s->is_unbodied = best == NO_BODY && has >= HAS_UNKNOWN;
 }
 
 static bool take_out(struct ifc_index *x, const struct shape *s, struct ifc_edits *edits)
@@ -285,25 +217,36 @@ static bool take_out(struct ifc_index *x, const struct shape *s, struct ifc_edit
     return n == s->n || ifc_edits_keep(edits, &x->text, s->list, kept, n);
 }
 
-int ifc_shapes_choose(struct ifc_index *x, struct ifc_product *product, size_t n_products, struct ifc_edits *edits,
-                      struct sh_err *err)
+/* Products may share a shape, so shapes change only after all products have been looked at. A shape that was changed
+ * has nothing more to take out. */
+static bool take_all_out(struct ifc_index *x, struct ifc_items *items, const struct ifc_product *product,
+                         size_t n_products, struct ifc_edits *edits)
 {
     struct shape s;
     for (size_t i = 0; i < n_products; i++) {
+        if (!read_shape(items, product[i].shape, &s)) continue;
+        choose_reps(&s);
+        if (!take_out(x, &s, edits)) return false;
+    }
+    return true;
+}
+
+int ifc_shapes_choose(struct ifc_index *x, struct ifc_product *product, size_t n_products, struct ifc_edits *edits,
+                      struct sh_err *err)
+{
+    struct ifc_items items;
+    struct shape s;
+    bool done = ifc_items_open(&items, x);
+    for (size_t i = 0; i < n_products && done; i++) {
         struct ifc_product *p = &product[i];
-        const bool is_whole = read_shape(x, p->shape, &s);
+        const bool is_whole = read_shape(&items, p->shape, &s);
         choose_reps(&s);
         p->has_body = s.has_body || !is_whole;
         p->is_boxed = s.is_boxed;
         p->is_unbodied = s.is_unbodied;
         p->is_level = s.is_level;
     }
-    /* Products may share a shape, so shapes change only after all products have been looked at. A shape that was
-     * changed has nothing more to take out. */
-    for (size_t i = 0; i < n_products; i++) {
-        if (!read_shape(x, product[i].shape, &s)) continue;
-        choose_reps(&s);
-        if (!take_out(x, &s, edits)) return ifc_no_memory(x, err);
-    }
-    return SH_OK;
+    done = done && take_all_out(x, &items, product, n_products, edits);
+    ifc_items_close(&items);
+    return done ? SH_OK : ifc_no_memory(x, err);
 }

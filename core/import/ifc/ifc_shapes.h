@@ -5,8 +5,8 @@
 #define CORE_IMPORT_IFC_IFC_SHAPES_H
 
 #include "core/import/ifc/ifc_edits.h"
-#include "core/import/ifc/ifc_index.h"
 
+struct ifc_index;
 struct ifc_product;
 
 /* Fills has_body, is_boxed, is_unbodied and is_level of all products. Takes the other representations out of the

@@ -22,28 +22,43 @@ function write(bytes) {
 // For a file below this size, reading takes less time than compiling the optimised code would.
 const SMALL = 6e6
 
+const bytes_of = array => new Uint8Array(array.buffer, array.byteOffset, array.byteLength)
+
+// Puts texts that are longer than what they replace into a copy of the file.
+function spliced(bytes, longer) {
+  const out = new Uint8Array(longer.reduce((n, { text, length }) => n + text.length - length, bytes.length))
+  let from = 0, to = 0
+  for (const { place, length, text } of longer) {
+    out.set(bytes.subarray(from, place), to)
+    out.set(text, to + place - from)
+    to += place - from + text.length
+    from = place + length
+  }
+  out.set(bytes.subarray(from), to)
+  return out
+}
+
 // Descriptor 5 has the file's size on a line, and a line "place length text" for each part of the file that gives way
-// to a text (ifc_edits.h). The places are those of the file as it is, in their order.
+// to a text (ifc_edits.h). The places are those of the file as it is, in their order. A file may take a large part of
+// the memory that is allowed, so a text that fits is written into its place, and blanks follow.
 function edited(bytes, lines) {
   const [size, ...edits] = lines.split('\n')
-  const parts = []
-  let at = 0
+  const longer = []
   if (edits.length > 1 && bytes.length !== Number(size)) throw new Error('the file changed while it was read')
   for (const edit of edits.slice(0, -1)) {
-    const [, place, length, text] = /^(\d+) (\d+) (.*)$/.exec(edit)
-    parts.push(bytes.subarray(at, Number(place)), Buffer.from(text, 'latin1'))
-    at = Number(place) + Number(length)
+    const [, at, n, line] = /^(\d+) (\d+) (.*)$/.exec(edit)
+    const place = Number(at), length = Number(n), text = Buffer.from(line, 'latin1')
+    if (text.length > length) longer.push({ place, length, text })
+    else bytes.fill(32, place, place + length).set(text, place)
   }
-  return parts.length > 0 ? new Uint8Array(Buffer.concat([...parts, bytes.subarray(at)])) : bytes
+  return longer.length > 0 ? spliced(bytes, longer) : bytes
 }
 
 export function load(file) {
-  const bytes = edited(new Uint8Array(fs.readFileSync(file)), fs.readFileSync(EDITS, 'latin1'))
+  const bytes = edited(bytes_of(fs.readFileSync(file)), fs.readFileSync(EDITS, 'latin1'))
   if (bytes.length < SMALL) v8.setFlagsFromString('--liftoff-only')
   return bytes
 }
-
-const bytes_of = array => new Uint8Array(array.buffer, array.byteOffset, array.byteLength)
 
 const filling = n => new Uint8Array((8 - n % 8) % 8)
 
