@@ -21,7 +21,7 @@
 
 /* Steps of 10 degrees: 17 rings of 36 shots, and one at each pole. The 8 rings below the horizon and the one straight
  * down meet the floor. */
-enum { SHOTS = 17 * 36 + 2, POINTS = 8 * 36 + 1, MOST_BYTES = 200000 };
+enum { SHOTS = 17 * 36 + 2, POINTS = 8 * 36 + 1, MOST_BYTES = 200000, ALL_EVENTS = 1 << 30 };
 
 static uint8_t bytes[MOST_BYTES];
 static size_t n_bytes;
@@ -109,7 +109,7 @@ static void give(const void *data, size_t len)
     assert_int_equal(write(w->link.fd, data, len), (ssize_t)len); /* it fits into the socket */
 }
 
-/* Gives the frames of the stream, without events of this code; 0: with all. Returns the next frame's number. */
+/* Gives the frames of the stream, but no events of this code (0: it gives all). Returns the next frame's number. */
 static uint32_t give_stream(uint32_t without)
 {
     uint32_t next = 0;
@@ -122,7 +122,7 @@ static uint32_t give_stream(uint32_t without)
         if (without != 0 && h.type == NATIVE_EVENT &&
             native_decode_event(bytes + at + NATIVE_HEADER_LEN, native_frame_len(bytes + at) - NATIVE_HEADER_LEN,
                                 &event) == SH_OK &&
-            event.code == without)
+            (event.code == without || without == ALL_EVENTS))
             continue;
         give(bytes + at, native_frame_len(bytes + at));
     }
@@ -281,32 +281,61 @@ static void end_scan_of_device(void)
     free(work);
 }
 
-static void give_scan_end(void)
+static void give_event(uint32_t seq, uint32_t code, uint64_t a)
 {
     uint8_t frame[256];
-    const struct native_event end = {.code = NATIVE_EV_SCAN_END, .a = 1};
-    native_encode_event(frame, sizeof frame, &end, 1000000000, 0);
-    give(frame, native_finish_frame(frame, 1));
+    const struct native_event event = {.code = code, .a = a};
+    native_encode_event(frame, sizeof frame, &event, 1000000000, 0);
+    give(frame, native_finish_frame(frame, seq));
 }
 
-/* Once the head's scan is over, the observer is behind until it has read that: by the event, or by telemetry. The scan
- * may have no points, in the last two rows. An observer that reads no more is not waited for. */
+/* Once the head's scan is over, the observer is behind until it has read that: by SCAN_END, by telemetry, or since
+ * power went or the head boots. The scan may have no points. An observer that reads no more is not waited for. */
 static void the_observer_is_behind_until_the_end(void **state)
 {
+    static const struct {
+        int points, by_telemetry, by_event, behind;
+        uint32_t code, a;
+    } rows[] = {
+        /* clang-format off */
+        {1, 1, 0, 0, 0, 0}, {1, 0, 0, 1, 0, 0}, {0, 1, 0, 0, 0, 0},
+        {1, 0, 1, 0, NATIVE_EV_SCAN_END, 1}, {0, 0, 1, 0, NATIVE_EV_SCAN_END, 1},
+        {1, 0, 1, 0, NATIVE_EV_STATE, HEAD_OFF}, {0, 0, 1, 0, NATIVE_EV_STATE, HEAD_OFF},
+        {1, 0, 1, 0, NATIVE_EV_STATE, HEAD_BOOT}, {1, 0, 1, 1, NATIVE_EV_STATE, HEAD_SPIN_DOWN},
+        /* clang-format on */
+    };
     (void)state;
     record("");
-    for (int row = 0; row < 5; row++) {
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         open_watch(NULL, 0);
         assert_int_equal(watch_is_behind(w), 0); /* the scan goes on */
         end_scan_of_device();
         assert_int_equal(watch_is_behind(w), 1);
-        const uint32_t next = row < 3 ? give_stream(row == 0 ? 0 : NATIVE_EV_SCAN_END) : 1;
-        if (row == 1 || row == 3) give_telemetry(next, HEAD_IDLE, 1);
-        if (row == 4) give_scan_end();
+        if (!rows[i].points) give_event(1, NATIVE_EV_SCAN_START, 1);
+        const uint32_t next = rows[i].points ? give_stream(NATIVE_EV_SCAN_END) : 2;
+        if (rows[i].by_telemetry) give_telemetry(next, HEAD_IDLE, 1);
+        if (rows[i].by_event) give_event(next, rows[i].code, rows[i].a);
         free(observed());
         assert_int_equal(watch_is_behind(w), 0);
         atomic_store(&w->is_deaf, 0);
-        assert_int_equal(watch_is_behind(w), row == 2);
+        assert_int_equal(watch_is_behind(w), rows[i].behind);
+        assert_int_equal(w->at.over, rows[i].points && !rows[i].behind);
+        close_watch();
+    }
+}
+
+/* The end of scan 1 was lost, and scan 2 has no points. Where scan 2 ends, scan 1 is over, too, and not the last one. */
+static void an_earlier_scan_s_end_is_not_the_last(void **state)
+{
+    (void)state;
+    record("");
+    for (int by_event = 0; by_event < 2; by_event++) {
+        open_watch(NULL, 0);
+        const uint32_t next = give_stream(NATIVE_EV_SCAN_END);
+        by_event ? give_event(next, NATIVE_EV_SCAN_END, 2) : give_telemetry(next, HEAD_IDLE, 2);
+        give_event(next + 1, NATIVE_EV_SCAN_START, 3);
+        free(observed());
+        assert_int_equal(atomic_load(&w->ended), 2);
         close_watch();
     }
 }
@@ -394,7 +423,7 @@ static void one_in_four_pulses_is_looked_at(void **state)
     w->at = (struct watch_scan){.scan = 1, .station = 1, .in_scene = 1}; /* it is at this scan already */
     w->now = w->head[0];
     w->sample.every = 4;
-    give_stream(0); /* its SCAN_START comes late, and ends nothing */
+    give_stream(ALL_EVENTS);
     char *quality = observed();
     same("every", number(quality, "{", "every"), 4, 0);
     same("points", number(quality, "{", "points"), POINTS, 0);
@@ -411,6 +440,7 @@ int main(void)
         cmocka_unit_test(stations_follow_each_other),
         cmocka_unit_test(telemetry_ends_a_scan),
         cmocka_unit_test(the_observer_is_behind_until_the_end),
+        cmocka_unit_test(an_earlier_scan_s_end_is_not_the_last),
         cmocka_unit_test(what_comes_after_the_end_does_not_count),
         cmocka_unit_test(points_in_mirrors_are_left_out),
         cmocka_unit_test(another_head_s_stations_are_passed_over),

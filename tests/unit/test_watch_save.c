@@ -4,6 +4,7 @@
 #include "tests/unit/commands_rig.h"
 
 #include <dirent.h>
+#include <dlfcn.h>
 #include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
@@ -32,6 +33,33 @@ int setpriority(__priority_which_t which, id_t who, int to)
     atomic_store(&lowered_to, which == PRIO_PROCESS && who == (id_t)gettid() ? to : -1);
     atomic_fetch_add(&n_lowered, 1);
     return 0;
+}
+
+static struct past *growing; /* it takes more frames once a whole piece of it is written; NULL: none does */
+static uint64_t n_taken;     /* points */
+
+/* Takes the frames of `rest` until so many points have come in all. */
+static void take_points(struct past *to, uint64_t in_all)
+{
+    struct scanhead_frame frame;
+    while (n_taken < in_all) {
+        assert_int_equal(scanhead_next(rest, &frame, -1), 0);
+        past_take(to, &frame);
+        if (frame.type == SCANHEAD_POINTS) n_taken += frame.n_points;
+    }
+}
+
+/* The product's call comes here, between two pieces of the past. */
+size_t fwrite(const void *from, size_t size, size_t n, FILE *f)
+{
+    size_t (*real)(const void *, size_t, size_t, FILE *);
+    void *found = dlsym(RTLD_NEXT, "fwrite");
+    memcpy(&real, &found, sizeof real);
+    if (n >= PAST_PIECE && growing != NULL) {
+        take_points(growing, 130000);
+        growing = NULL;
+    }
+    return real(from, size, n, f);
 }
 
 /* Sets the folder for temporary files: `t`, which exists, or another one, which does not. */
@@ -303,6 +331,44 @@ static void the_end_of_a_scan_is_waited_for(void **state)
     past_free(part);
 }
 
+/* A piece of at least 1 MiB has 52,000 points of 20 bytes. When the first one is written, more points come, and the
+ * first and the second go. So the file has the first and the third. All shots meet a wall, so a PLY has all points. */
+static void points_that_go_meanwhile_are_counted(void **state)
+{
+    (void)state;
+    char head[2048] = "", want[64];
+    unsigned n_points = 0;
+    struct web_body body;
+    struct past *part = past_create(&(struct past_limits){70000, PAST_MOST_BYTES});
+    assert_non_null(part);
+    write_text("room.obj", "o room\nv -5 -5 0\nv 5 -5 0\nv 5 5 0\nv -5 5 0\nv -5 -5 4\nv 5 -5 4\nv 5 5 4\nv -5 5 4\n"
+                           "f 1 2 3 4\nf 8 7 6 5\nf 1 5 6 2\nf 2 6 7 3\nf 3 7 8 4\nf 4 8 5 1\n");
+    write_text("room.yaml",
+               "head: {profile: sphere, step_deg: 0.6}\noutput: {crs: local}\n"
+               "scene: {meshes: [{file: room.obj, up: z, scale: 1}]}\nstations: [{position_m: [0, 0, 2]}]\n");
+    does(&app_record, "room.yaml -o room.shs --quiet", 0);
+    assert_int_equal(scanhead_open("room.shs", &rest, NULL, 0), 0);
+    take_points(part, 60000);
+    growing = part;
+    save_free(save);
+    save = save_create(&(struct save_source){.past = part});
+    make_ply();
+    assert_null(growing);
+    assert_int_equal(save_get_piece(save, "file=1", &body, &err), SH_OK);
+    memcpy(head, body.bytes, sizeof head - 1);
+    free(body.bytes);
+    has(head, "comment frames_lost 1 reader_lost 0 ");
+    assert_int_equal(sscanf(strstr(head, "element vertex"), "element vertex %u", &n_points), 1);
+    assert_in_range(n_points, 60000, 90000);
+    snprintf(want, sizeof want, "\"gone\":%u,\"lost_frames\":0}", (unsigned)n_taken - n_points);
+    assert_int_equal(save_get(save, "", &body, &err), SH_OK);
+    has(body.bytes, want);
+    free(body.bytes);
+    close_save(state);
+    scanhead_close(rest);
+    past_free(part);
+}
+
 /* The next file takes the place of the last one, in the same folder. */
 static void one_file_is_there_at_a_time(void **state)
 {
@@ -453,6 +519,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(the_file_is_that_of_a_recording, open_save, close_save),
         cmocka_unit_test_setup_teardown(lost_frames_are_counted, open_save, close_save),
         cmocka_unit_test_setup_teardown(the_end_of_a_scan_is_waited_for, open_save, close_save),
+        cmocka_unit_test_setup_teardown(points_that_go_meanwhile_are_counted, open_save, close_save),
         cmocka_unit_test_setup_teardown(one_file_is_there_at_a_time, open_save, close_save),
         cmocka_unit_test_setup_teardown(wrong_questions, open_save, close_save),
         cmocka_unit_test_setup_teardown(a_failure_leaves_nothing, open_save, close_save),

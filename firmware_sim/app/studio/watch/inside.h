@@ -85,6 +85,7 @@ struct watch {
     struct watch_sample sample;
     struct watch_seen seen;
     struct watch_scan at; /* the scan at hand; a head never gives a number to two scans */
+    uint32_t begun;       /* the last scan that the stream has named; 0: none */
     int missed;           /* frames were lost on the way here: a scan's end may be among them */
     int dirty;            /* something came since the last figures */
     int64_t began_ns, began_thread_ns, published_ns, publish_ns;

@@ -59,6 +59,7 @@ static const struct site *find_head(struct watch *w, const struct scanhead_info 
 static void begin_unknown(struct watch *w, uint32_t scan, uint32_t station)
 {
     let_go(w);
+    w->begun = scan;
     w->at = (struct watch_scan){.scan = scan, .station = station};
     w->now = w->head[station - 1];
     watch_sample_begin(w);
@@ -76,11 +77,17 @@ static void begin_scan(struct watch *w, const struct scanhead_info *info)
     w->began_thread_ns = clock_thread_ns();
 }
 
+/* The end of an earlier scan may be found after that of a later one, which had no points. */
+static void note_end(struct watch *w, uint32_t scan)
+{
+    if (scan > atomic_load(&w->ended)) atomic_store(&w->ended, scan);
+}
+
 static void end_scan(struct watch *w)
 {
     if (w->at.scan == 0 || w->at.over) return;
     w->at.over = 1;
-    atomic_store(&w->ended, w->at.scan);
+    note_end(w, w->at.scan);
     watch_publish(w);
     w->at.in_scene = 0; /* no more points of this scan come, and its site is given back */
     let_go(w);
@@ -174,7 +181,7 @@ static void take_telemetry(struct watch *w, const struct scanhead_frame *frame)
     struct native_telemetry t;
     if (native_decode_telemetry(frame->payload, frame->payload_len, &t) != SH_OK || t.scan == 0) return;
     if (t.state == HEAD_SCANNING || t.state == HEAD_SPIN_DOWN) return;
-    atomic_store(&w->ended, t.scan);
+    note_end(w, t.scan);
     if (t.scan != w->at.scan && !follow_scan(w)) return;
     if (t.scan == w->at.scan) end_scan(w);
 }
@@ -187,6 +194,31 @@ static void note_lost(struct watch *w, uint64_t in_all)
     pthread_mutex_unlock(&w->lock);
 }
 
+static void observe_take_event(struct watch *w, const struct scanhead_frame *frame)
+{
+    const uint64_t a = frame->event_value[0];
+    switch (frame->event) {
+    case SCANHEAD_EV_READER_LOST:
+        note_lost(w, frame->event_value[2]);
+        break;
+    case SCANHEAD_EV_SCAN_START: /* that of the scan at hand can come after its first points */
+        if ((uint32_t)a != w->at.scan) end_scan(w); /* the head at hand numbers its scans on */
+        w->begun = (uint32_t)a;
+        break;
+    case SCANHEAD_EV_SCAN_END:
+        note_end(w, (uint32_t)a);
+        end_scan(w);
+        break;
+    case SCANHEAD_EV_STATE: /* a scan that loses its power, also at a reboot, has no SCAN_END */
+        if (a != HEAD_OFF && a != HEAD_BOOT) break;
+        note_end(w, w->begun);
+        end_scan(w);
+        break;
+    default:
+        break;
+    }
+}
+
 static void take_frame(struct watch *w, const struct scanhead_frame *frame)
 {
     struct sh_err err;
@@ -197,12 +229,7 @@ static void take_frame(struct watch *w, const struct scanhead_frame *frame)
             w->sample.n = w->sample.done; /* no memory now: these are passed over */
     }
     if (frame->type == SCANHEAD_TELEMETRY) take_telemetry(w, frame);
-    if (frame->type != SCANHEAD_EVENT) return;
-    if (frame->event == SCANHEAD_EV_READER_LOST) note_lost(w, frame->event_value[2]);
-    if (frame->event == SCANHEAD_EV_SCAN_END) atomic_store(&w->ended, (uint32_t)frame->event_value[0]);
-    /* The event of the scan at hand can come after its first points. The head at hand numbers its scans on. */
-    const int is_other = frame->event == SCANHEAD_EV_SCAN_START && (uint32_t)frame->event_value[0] != w->at.scan;
-    if (frame->event == SCANHEAD_EV_SCAN_END || is_other) end_scan(w);
+    if (frame->type == SCANHEAD_EVENT) observe_take_event(w, frame);
 }
 
 /* Nothing has come for QUIET times NEXT_MS. At the pace `fast` no time passes for an idle head, so it sends no

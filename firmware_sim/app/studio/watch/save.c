@@ -64,15 +64,6 @@ static int make_folder(struct save *s, struct sh_err *err)
     return rc;
 }
 
-/* first: it is the head of the first piece. Points that go later may be in the file. */
-static void note_missing(struct save *s, const uint8_t *head, int first)
-{
-    pthread_mutex_lock(&s->lock);
-    if (first) s->gone = le_get64(head + 32);
-    s->lost_frames = le_get64(head + 40);
-    pthread_mutex_unlock(&s->lock);
-}
-
 static int save_ends(void *self)
 {
     struct save *s = self;
@@ -113,25 +104,44 @@ static int await_scan_end(struct save *s, struct sh_err *err)
  * leave a gap, as they do in the stream that it read. */
 struct renumber {
     uint32_t next;
-    uint64_t lost; /* in all, as READER_LOST says */
+    uint64_t lost;   /* in all, as READER_LOST says */
+    uint64_t points; /* of the frames so far */
 };
 
 static void renumber(struct renumber *r, uint8_t *frames, size_t len)
 {
     for (uint8_t *at = frames, *end = frames + len; at < end; at += native_frame_len(at)) {
+        const uint8_t *payload = at + NATIVE_HEADER_LEN;
+        const size_t payload_len = native_frame_len(at) - NATIVE_HEADER_LEN;
         struct native_header h;
         struct native_event event;
+        struct native_points points;
         native_read_header(at, &h);
         if ((h.flags & NATIVE_LOCAL) == 0) {
+            if (h.type == NATIVE_POINTS && native_decode_points(payload, payload_len, &points) == SH_OK)
+                r->points += points.n_points;
             native_finish_frame(at, r->next++);
             continue;
         }
-        if (h.type != NATIVE_EVENT ||
-            native_decode_event(at + NATIVE_HEADER_LEN, native_frame_len(at) - NATIVE_HEADER_LEN, &event) != SH_OK)
-            continue;
+        if (h.type != NATIVE_EVENT || native_decode_event(payload, payload_len, &event) != SH_OK) continue;
         r->next += (uint32_t)(event.c - r->lost);
         r->lost = event.c;
     }
+}
+
+/* The past may have dropped pieces at `from` since the frames before were read. A gap of one number stands for their
+ * frames, which nobody has counted. All points that went are then older than this piece, and the file has some of
+ * them. Points that go later may be in the file. */
+static void note_missing(struct save *s, const struct web_body *piece, uint64_t from, struct renumber *numbers)
+{
+    const uint8_t *head = (const uint8_t *)piece->bytes;
+    const uint64_t begin = le_get64(head + 16) - (piece->len - PAST_HEAD_LEN);
+    const int is_first = from == 0, has_jumped = begin > from;
+    if (has_jumped && !is_first) numbers->next++;
+    pthread_mutex_lock(&s->lock);
+    if (is_first || has_jumped) s->gone = le_get64(head + 32) - numbers->points;
+    s->lost_frames = le_get64(head + 40);
+    pthread_mutex_unlock(&s->lock);
 }
 
 /* Writes the frames that there are now. Frames that come meanwhile are left out, except in the last piece: it is read
@@ -147,8 +157,8 @@ static int write_frames(struct save *s, FILE *f, struct sh_err *err)
         if (rc != SH_OK) return rc;
         const uint8_t *head = (const uint8_t *)piece.bytes;
         const size_t len = piece.len - PAST_HEAD_LEN;
+        note_missing(s, &piece, next, &numbers);
         next = le_get64(head + 16);
-        note_missing(s, head, end == 0);
         if (end == 0) end = le_get64(head + 24);
         renumber(&numbers, (uint8_t *)piece.bytes + PAST_HEAD_LEN, len);
         const size_t written = fwrite(piece.bytes + PAST_HEAD_LEN, 1, len, f);
