@@ -93,9 +93,11 @@ static int take_pose(struct device *device, int64_t t_ns, const double v[6], str
     return SH_OK;
 }
 
+/* A journal with an END has all poses up to its END, also those after its last line: none. */
 int device_replays_poses(const struct device *device)
 {
-    return device->journal.has_poses && device->journal.at < device->journal.n_replay;
+    const struct device_journal *journal = &device->journal;
+    return journal->has_poses && (journal->at < journal->n_replay || (journal->ends && !device->over));
 }
 
 int device_pose(struct device *device, int64_t t_ns, const double v[6], struct sh_err *err)

@@ -268,32 +268,39 @@ static void a_replay_has_the_poses(void **state)
     assert_memory_equal(again, once, sizeof once);
 }
 
-/* While a journal with poses is replayed, no others are taken; after its last line they are. A journal without poses,
- * as earlier heads wrote it, leaves them to the peer. */
+/* While a journal with poses is replayed, no others are taken. That is up to its END; where it has none, poses are taken
+ * after its last line. A journal without poses, as earlier heads wrote it, leaves them to the peer. */
 static void a_replay_takes_no_other_poses(void **state)
 {
     (void)state;
     static const char *const sets[] = {"platform.kind=live", "loop.pace=step"};
-    static const char *const lines[] = {"0 1000000 0 POSE 1 0 0 0 0 0\n20 9000000 1 HEAD:LINES 50\n",
-                                        "20 9000000 1 HEAD:LINES 50\n"};
+    static const struct {
+        const char *lines;
+        int at_10_ms, at_30_ms; /* whether poses are taken */
+    } rows[] = {{"0 1000000 0 POSE 1 0 0 0 0 0\n20 9000000 1 HEAD:LINES 50\n", 0, 1},
+                {"0 1000000 0 POSE 1 0 0 0 0 0\n40 40000000 0 END\n", 0, 0},
+                {"20 9000000 1 HEAD:LINES 50\n40 40000000 0 END\n", 1, 1},
+                {"20 9000000 1 HEAD:LINES 50\n", 1, 1}};
     const double v[6] = {2};
-    for (int i = 0; i < 2; i++) {
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         struct command_result result;
         struct sh_err err;
         FILE *f = fopen(journal_path, "w");
         assert_non_null(f);
-        fprintf(f, "# scanhead journal 1\n%s", lines[i]);
+        fprintf(f, "# scanhead journal 1\n%s", rows[i].lines);
         assert_int_equal(fclose(f), 0);
         struct rig *rig = rig_open(&(struct device_options){.replay = journal_path}, sets, 2);
         rig_go_to(rig, 10);
-        assert_int_equal(device_pose(rig->device, 5000000, v, &err), i == 0 ? SH_EINPUT : SH_OK);
-        if (i == 0) assert_string_equal(err.text, "a pose came while a journal with poses is being replayed");
+        assert_int_equal(device_pose(rig->device, 5000000, v, &err), rows[i].at_10_ms ? SH_OK : SH_EINPUT);
+        if (!rows[i].at_10_ms)
+            assert_string_equal(err.text, "a pose came while a journal with poses is being replayed");
         device_command(rig->device, 1, "TIME:STEP 1 MS, 1,0,0,0,0,0", 9, &result);
-        assert_int_equal(result.error, i == 0 ? CMD_E_SETTINGS : 0);
+        assert_int_equal(result.error, rows[i].at_10_ms ? 0 : CMD_E_SETTINGS);
         rig_tell(rig, "TIME:STEP 1 MS", 9);
         rig_go_to(rig, 30);
-        assert_int_equal(device_pose(rig->device, 6000000, v, NULL), SH_OK);
-        rig_tell(rig, "TIME:STEP 1 MS, 1,0,0,0,0,0", 29);
+        assert_int_equal(device_pose(rig->device, 6000000, v, NULL), rows[i].at_30_ms ? SH_OK : SH_EINPUT);
+        device_command(rig->device, 1, "TIME:STEP 1 MS, 1,0,0,0,0,0", 29, &result);
+        assert_int_equal(result.error, rows[i].at_30_ms ? 0 : CMD_E_SETTINGS);
         rig_close(rig);
     }
 }
