@@ -328,39 +328,6 @@ static void poses_come_in_order(void **state)
     rig_close(rig);
 }
 
-/* The head goes north at 20 m/s, with a fix ten times a second. Each fix is where the head was then, not a tenth of a
- * second further. */
-static void a_fix_is_where_the_head_was(void **state)
-{
-    (void)state;
-    char path[96], set[128];
-    snprintf(path, sizeof path, "%s/north.csv", folder);
-    snprintf(set, sizeof set, "platform.waypoints=%s", path);
-    FILE *f = fopen(path, "w");
-    assert_non_null(f);
-    fputs("x_m,y_m,z_m,speed_m_s\n0,0,0,20\n0,100,0,20\n", f);
-    assert_int_equal(fclose(f), 0);
-    const char *const sets[] = {"platform.kind=trajectory", set,
-                                "stations[1].name=b",       "head.frames=0",
-                                "stations[0].lat_deg=0",    "stations[0].lon_deg=11",
-                                "stations[0].height_m=0",   "stations[1].lat_deg=1",
-                                "stations[1].lon_deg=11",   "stations[1].height_m=0",
-                                "links[0].type=null",       "links[0].protocol=nmea",
-                                "gnss.rate_hz=10",          "time.epoch=2026-01-01T00:00:00Z"};
-    struct rig *rig = rig_open(&(struct device_options){.start = 1}, sets, 14);
-    const int64_t t0_ns = (int64_t)rig_wait(rig, NATIVE_EV_SCAN_START, 1000)->b;
-    rig_go_to(rig, rig->next + 1500);
-    const double e2 = 0.00669437999014, metres_per_deg = 6378137 * (1 - e2) * M_PI / 180; /* WGS 84, at the equator */
-    for (int tenth = 5; tenth < 15; tenth++) {
-        struct nmea_fix fix;
-        assert_int_equal(device_fix(rig->device, tenth * INT64_C(100000000) + 12345, &fix), 1);
-        const double want_m = 20 * fmax(0, 0.1 * tenth - 1e-9 * (double)t0_ns);
-        assert_true(fabs(fix.lat_deg * metres_per_deg - want_m) < 0.01); /* a tenth is 2 m further */
-    }
-    rig_close(rig);
-    unlink(path);
-}
-
 /* In lock-step a tick has all pulses that fire within it: none waits for its packet to be whole. At other paces, and
  * without a live platform, some do, and the stream is the same at any pace. */
 static void a_tick_of_lock_step_has_all_its_pulses(void **state)
@@ -399,7 +366,6 @@ int main(void)
         cmocka_unit_test(the_reach_is_that_of_the_heads_station),
         cmocka_unit_test(no_pose_is_lost_before_its_time),
         cmocka_unit_test(no_pose_is_used_before_its_time),
-        cmocka_unit_test(a_fix_is_where_the_head_was),
     };
     return cmocka_run_group_tests_name("device path", tests, make_folder, remove_folder);
 }
