@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The receiver's fixes of a head that moves. */
+/* The receiver's fixes of a head that moves, and the poses that they need. */
 #include <math.h>
 
 #include "firmware_sim/config/config.h"
@@ -66,11 +66,26 @@ static void a_fix_at_the_first_pose_has_its_speed(void **state)
     }
 }
 
+/* A platform in lock-step has a pose each 10 us, of which those kept are of 0.66 s. None is ahead, so none is refused,
+ * though a receiver's fixes could use older ones. */
+static void quick_poses_are_not_refused(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"platform.kind=live", "loop.pace=step", NMEA};
+    struct rig *rig = rig_open(NULL, sets, sizeof sets / sizeof sets[0]);
+    for (int i = 0; i < DEVICE_POSES_KEPT + 1000; i++) {
+        if (i % 100 == 0) rig_go_to(rig, (uint64_t)i / 100);
+        assert_int_equal(device_pose(rig->device, i * INT64_C(10000), (double[6]){0}, NULL), SH_OK);
+    }
+    rig_close(rig);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_fix_is_where_the_head_was),
         cmocka_unit_test(a_fix_at_the_first_pose_has_its_speed),
+        cmocka_unit_test(quick_poses_are_not_refused),
     };
     return cmocka_run_group_tests_name("device fixes", tests, make_folder, remove_folder);
 }

@@ -167,6 +167,8 @@ static void the_reach_is_that_of_the_heads_station(void **state)
     assert_int_equal(device_pose(rig->device, 30000000, (double[6]){5}, NULL), SH_EINPUT);
     assert_int_equal(device_head_pose(rig->device, 15000000, &pose), 0); /* between the two */
     assert_int_equal(device_head_pose(rig->device, 20000000, &pose), 1);
+    assert_int_equal(device_head_pose(rig->device, 24000000, &pose), 1);
+    assert_true(pose.position_m[0] == 0.0); /* the motion from the pose out of reach does not go on */
     rig_close(rig);
 }
 
@@ -179,19 +181,17 @@ static int ride(struct rig *rig, int from_ms, int n)
     return taken;
 }
 
-/* A pose that pulses still need keeps its place, and the pose that would take the place is refused. Here a scan begins
- * while as many poses are there as have room. */
-static void no_pose_is_lost_before_its_time(void **state)
+/* A scan begins while as many poses are there as have room. After 3 s those that no pulse needs any more have made
+ * room: as many as `room_ms` says. */
+static void ride_with(const char *const *sets, int n_sets, int room_ms)
 {
-    (void)state;
-    static const char *const sets[] = {"platform.kind=live", "platform.reach_m=100", "head.frames=0"};
-    struct rig *rig = rig_open(&(struct device_options){.start = 1}, sets, 3);
+    struct rig *rig = rig_open(&(struct device_options){.start = 1}, sets, n_sets);
     struct sh_err err;
     struct pose pose;
     assert_int_equal(ride(rig, 1, 70000), DEVICE_POSES_KEPT);
     assert_int_equal(atomic_load(&device_counters(rig->device)->bad_poses), 70000 - DEVICE_POSES_KEPT);
     assert_int_equal(device_pose(rig->device, INT64_C(80000000000), (double[6]){0}, &err), SH_EINPUT);
-    assert_string_equal(err.text, "a pose has no room: 65536 of them are ahead");
+    assert_string_equal(err.text, "a pose has no room: the 65536 that the head keeps are still needed; send it later");
     rig_wait(rig, NATIVE_EV_SCAN_START, 1000);
     for (int i = 0; i < 500; i++) {
         assert_true(rig_claim(rig));
@@ -201,15 +201,28 @@ static void no_pose_is_lost_before_its_time(void **state)
             assert_true(fabs(knot->pose.position_m[1] - 1e-9 * (double)(rig->work.scan_t0_ns + knot->t_ns)) < 1e-12);
         }
     }
-    rig_go_to(rig,
-              3001); /* poses up to 1 s ago have made room, 1,000 of them; the last 2 s are kept for the receiver */
-    const int taken = ride(rig, DEVICE_POSES_KEPT + 1, 2000);
-    assert_true(taken >= 995 && taken <= 1005);
-    for (int ms = 1010; ms < DEVICE_POSES_KEPT; ms += 997) {
+    rig_go_to(rig, 3001);
+    const int taken = ride(rig, DEVICE_POSES_KEPT + 1, 4000);
+    assert_true(taken >= room_ms - 5 && taken <= room_ms + 5);
+    for (int ms = room_ms + 10; ms < DEVICE_POSES_KEPT; ms += 997) {
         assert_int_equal(device_head_pose(rig->device, ms * INT64_C(1000000), &pose), 1);
         assert_true(fabs(pose.position_m[1] - 1e-3 * ms) < 1e-9);
     }
     rig_close(rig);
+}
+
+/* A pose that pulses still need keeps its place, and the pose that would take the place is refused. Where there is a
+ * receiver, its fixes need the poses of the last 2 s, too. */
+static void no_pose_is_lost_before_its_time(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"platform.kind=live",      "platform.reach_m=100",
+                                       "head.frames=0",           "scene.anchor.source=explicit",
+                                       "scene.anchor.lat_deg=0",  "scene.anchor.lon_deg=11",
+                                       "scene.anchor.height_m=0", "links[0].type=null",
+                                       "links[0].protocol=nmea",  "time.epoch=2026-01-01T00:00:00Z"};
+    ride_with(sets, 3, 3000);
+    ride_with(sets, sizeof sets / sizeof sets[0], 1000);
 }
 
 /* A single pose that is far ahead. Until its time the head is at its station, which is flagged, counted and announced.
@@ -328,6 +341,17 @@ static void poses_come_in_order(void **state)
     rig_close(rig);
 }
 
+/* A head that isn't on a live platform has no room for poses. */
+static void a_pose_needs_a_live_platform(void **state)
+{
+    (void)state;
+    struct rig *rig = rig_open(NULL, NULL, 0);
+    struct sh_err err;
+    assert_int_equal(device_pose(rig->device, 5000000, (double[6]){0}, &err), SH_EINPUT);
+    assert_string_equal(err.text, "a pose needs platform.kind: live");
+    rig_close(rig);
+}
+
 /* In lock-step a tick has all pulses that fire within it: none waits for its packet to be whole. At other paces, and
  * without a live platform, some do, and the stream is the same at any pace. */
 static void a_tick_of_lock_step_has_all_its_pulses(void **state)
@@ -366,6 +390,7 @@ int main(void)
         cmocka_unit_test(the_reach_is_that_of_the_heads_station),
         cmocka_unit_test(no_pose_is_lost_before_its_time),
         cmocka_unit_test(no_pose_is_used_before_its_time),
+        cmocka_unit_test(a_pose_needs_a_live_platform),
     };
     return cmocka_run_group_tests_name("device path", tests, make_folder, remove_folder);
 }
