@@ -73,8 +73,9 @@ static int locate_antenna(const struct gnss *gnss, const struct placement *at, c
     return locate(gnss->site, at, p_prcs, geodetic);
 }
 
-/* Sets the velocity east, north and up, from two places that are 2 GNSS_STEP_NS apart. */
-static void set_velocity(const double before[3], const double here[3], const double after[3], double velocity_m_s[3])
+/* Sets the velocity east, north and up, from two places that are span_ns apart. */
+static void set_velocity(const double before[3], const double here[3], const double after[3], int64_t span_ns,
+                         double velocity_m_s[3])
 {
     const struct georef_place place[3] = {
         {before[0], before[1], before[2]}, {here[0], here[1], here[2]}, {after[0], after[1], after[2]}};
@@ -82,7 +83,7 @@ static void set_velocity(const double before[3], const double here[3], const dou
     georef_geodetic_to_ecef(&place[0], p[0]);
     georef_geodetic_to_ecef(&place[2], p[1]);
     for (int i = 0; i < 3; i++)
-        d[i] = (p[1][i] - p[0][i]) / (2e-9 * GNSS_STEP_NS);
+        d[i] = (p[1][i] - p[0][i]) / (1e-9 * (double)span_ns);
     if (locate_axes(&place[1], at_ecef, enu, NULL) == SH_OK) mat3_apply_transposed(enu, d, velocity_m_s);
 }
 
@@ -96,9 +97,9 @@ static int gnss_position(const struct gnss *gnss, uint32_t station, const struct
     memcpy(stands.position_m, at->position_m, sizeof stands.position_m);
     pose_from_matrix(at->rotation, stands.quat);
     if (!locate_antenna(gnss, at, track != NULL ? &track->at : &stands, here)) return 0;
-    if (track != NULL && locate_antenna(gnss, at, &track->before, before) &&
+    if (track != NULL && track->span_ns != 0 && locate_antenna(gnss, at, &track->before, before) &&
         locate_antenna(gnss, at, &track->after, after))
-        set_velocity(before, here, after, out->velocity_m_s);
+        set_velocity(before, here, after, track->span_ns, out->velocity_m_s);
     georef_geodetic(here[0], here[1], here[2], shift_m, out->geodetic);
     return 1;
 }

@@ -226,7 +226,7 @@ static int add_entry(struct reader *reader, struct sh_err *err)
                          "out",
                          reader->end_no);
     if (reader->n == MAX_ENTRIES)
-        return fail_line(reader, err, "too many commands; allowed up to %d in a journal", MAX_ENTRIES);
+        return fail_line(reader, err, "too many commands and poses; allowed up to %d in a journal", MAX_ENTRIES);
     if (!grow(&reader->entry, &reader->capacity, reader->n + 1, sizeof *reader->entry))
         return sh_fail(err, SH_ENOMEM, "journal: %s: no memory", reader->path);
     const char *wrong = parse_entry(reader->text, &reader->entry[reader->n]);

@@ -53,28 +53,32 @@ static int is_early(const struct device *device, int64_t t_ns)
     return device->site->cfg->loop.pace != PACE_STEP && t_ns > now_ns + DEVICE_POSE_AHEAD_S * INT64_C(1000000000);
 }
 
-/* Whether one more pose leaves those that are still needed: by pulses that are not claimed yet, and by fixes. */
-static int has_room(const struct device *device)
+/* Whether one more pose leaves those that are still needed by pulses that are not claimed yet. A pose that is so far
+ * ahead that it can come later leaves those that the receiver's fixes may need, too. */
+static int has_room(const struct device *device, int64_t t_ns)
 {
     const struct device_live *live = &device->live;
     if (live->n < DEVICE_POSES_KEPT) return 1;
     const uint64_t tick = device->scan.on ? device->scan.tick0 + (uint64_t)live->next : device->next_tick;
     const int64_t oldest_ns = sample_at(live, live->n - DEVICE_POSES_KEPT + 1)->t_ns; /* once the new one is there */
-    return oldest_ns <= (int64_t)tick * device->tick_ns - PAST_NS;
+    const int can_wait = t_ns > (int64_t)device->next_tick * device->tick_ns + PAST_NS;
+    return oldest_ns <= (int64_t)tick * device->tick_ns - (device->gnss.on && can_wait ? PAST_NS : 0);
 }
 
 static int check_pose(const struct device *device, int64_t t_ns, const struct pose *pose, struct sh_err *err)
 {
     const struct device_live *live = &device->live;
     const int64_t last_ns = live->n != 0 ? sample_at(live, live->n - 1)->t_ns : INT64_MIN;
+    if (live->sample == NULL) return sh_fail(err, SH_EINPUT, "a pose needs platform.kind: live");
     if (!is_near(device, pose))
         return sh_fail(err, SH_EINPUT, "a pose is over %g m from the station", device->site->cfg->platform.reach_m);
     if (t_ns <= last_ns)
         return sh_fail(err, SH_EINPUT, "a pose is not after the last pose, of %.9g s", 1e-9 * (double)last_ns);
     if (t_ns < 0) return sh_fail(err, SH_EINPUT, "a pose is before power-up; allowed is 0 s on");
     if (is_early(device, t_ns)) return sh_fail(err, SH_EINPUT, "a pose is over %d s ahead", DEVICE_POSE_AHEAD_S);
-    if (has_room(device)) return SH_OK;
-    return sh_fail(err, SH_EINPUT, "a pose has no room: %d of them are ahead", DEVICE_POSES_KEPT);
+    if (has_room(device, t_ns)) return SH_OK;
+    return sh_fail(err, SH_EINPUT, "a pose has no room: the %d that the head keeps are still needed; send it later",
+                   DEVICE_POSES_KEPT);
 }
 
 static int take_pose(struct device *device, int64_t t_ns, const double v[6], struct sh_err *err)
@@ -93,9 +97,11 @@ static int take_pose(struct device *device, int64_t t_ns, const double v[6], str
     return SH_OK;
 }
 
+/* A journal with an END has all poses up to its END, also those after its last line: none. */
 int device_replays_poses(const struct device *device)
 {
-    return device->journal.has_poses && device->journal.at < device->journal.n_replay;
+    const struct device_journal *journal = &device->journal;
+    return journal->has_poses && (journal->at < journal->n_replay || (journal->ends && !device->over));
 }
 
 int device_pose(struct device *device, int64_t t_ns, const double v[6], struct sh_err *err)
@@ -118,9 +124,7 @@ void device_replay_pose(struct device *device, const struct journal_entry *entry
     struct sh_err err;
     int rc;
     memset(out, 0, sizeof *out);
-    if (device->live.sample == NULL)
-        rc = sh_fail(&err, SH_EINPUT, "a pose needs platform.kind: live");
-    else if (pose_line_read(journal_pose(entry), v) != 0)
+    if (pose_line_read(journal_pose(entry), v) != 0)
         rc = sh_fail(&err, SH_EINPUT, "a pose is x y z roll pitch heading");
     else
         rc = take_pose(device, entry->t_ns, v, &err);
@@ -130,7 +134,8 @@ void device_replay_pose(struct device *device, const struct journal_entry *entry
 }
 
 /* After the last pose the motion between the last two poses goes on for extrapolate_ms. Then the platform stands. Where
- * the motion would leave the reach, the platform stands at the last pose instead. */
+ * the motion would leave the reach, the platform stands at the last pose instead. It stands there, too, where the pose
+ * before is out of reach: that one came while the head was at another station. */
 static uint32_t extrapolate(const struct device *device, int64_t t_ns, struct pose *out)
 {
     const struct device_live *live = &device->live;
@@ -138,7 +143,7 @@ static uint32_t extrapolate(const struct device *device, int64_t t_ns, struct po
             most_ns = (int64_t)(device->site->cfg->platform.extrapolate_ms * 1e6);
     uint32_t flags = t_ns - last_ns > most_ns ? POSE_LATE : POSE_EXTRAPOLATED;
     *out = sample_at(live, live->n - 1)->pose;
-    if (live->n < 2) return flags;
+    if (live->n < 2 || !is_near(device, &sample_at(live, live->n - 2)->pose)) return flags;
     int64_t before_ns = sample_at(live, live->n - 2)->t_ns;
     int64_t on_ns = flags == POSE_LATE ? last_ns + most_ns : t_ns;
     struct pose on;

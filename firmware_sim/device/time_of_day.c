@@ -187,6 +187,18 @@ int64_t device_next_fix_ns(void *self, int64_t t_ns)
     return next_ns;
 }
 
+/* Finds the head's poses around a time. 0: the head stands, or it has no pose. Just before the time a live platform may
+ * have none yet. Just after it there may be one that is out of reach. */
+static int take_track(struct device *device, int64_t t_ns, struct gnss_track *track)
+{
+    track->span_ns = 0;
+    if (!device_head_pose(device, t_ns, &track->at)) return 0;
+    track->before = track->after = track->at;
+    if (device_head_pose(device, t_ns - GNSS_STEP_NS, &track->before)) track->span_ns += GNSS_STEP_NS;
+    if (device_head_pose(device, t_ns + GNSS_STEP_NS, &track->after)) track->span_ns += GNSS_STEP_NS;
+    return 1;
+}
+
 int device_fix(void *self, int64_t t_ns, struct nmea_fix *fix)
 {
     struct device *device = self;
@@ -205,12 +217,7 @@ int device_fix(void *self, int64_t t_ns, struct nmea_fix *fix)
     pthread_mutex_lock(&device->lock);
     clock = device->clock; /* a copy: faults may change its table of leap seconds */
     uint32_t station = device->cmd.settings.station - 1;
-    int moves = device_head_pose(device, at_ns, &track.at);
-    if (moves) {
-        /* Just before the time there may be no pose of a live platform yet. */
-        if (!device_head_pose(device, at_ns - GNSS_STEP_NS, &track.before)) track.before = track.at;
-        device_head_pose(device, at_ns + GNSS_STEP_NS, &track.after);
-    }
+    const int moves = take_track(device, at_ns, &track);
     pthread_mutex_unlock(&device->lock);
     gnss_fix(&gnss, sentence.index, station, moves ? &track : NULL, fix);
     device_give_back(version);

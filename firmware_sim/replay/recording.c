@@ -102,7 +102,8 @@ void recording_stats(const struct recording *r, struct scanhead_stats *stats)
     scanhead_get_stats(r->stream, stats);
 }
 
-/* A frame with a time of its own bounds the times of frames before it: they did not go out later. The last line of a
+/* A frame whose time is known bounds the times of all frames before it: they did not go out later. A frame that waits
+ * for its own time does not: several frames may be of the packet that a line's end cuts short. The last line of a
  * stopped scan went out together with the next event or telemetry, so it gets the time of that. */
 static void recording_settle(struct recording *r, const struct timing_moment *by, int is_event)
 {
@@ -119,7 +120,7 @@ static int replay_recording_put(struct recording *r, const struct scanhead_frame
     struct native_header header;
     native_read_header(frame->raw, &header);
     const struct timing_moment moment = timing_take(&r->timing, &header, frame->payload);
-    if (moment.kind != TIMING_FOLLOWS && moment.kind != TIMING_STOPS)
+    if (moment.kind == TIMING_KNOWN)
         recording_settle(r, &moment, header.type == NATIVE_EVENT || header.type == NATIVE_TELEMETRY);
     struct recording_item *item = item_of(r, r->n);
     if (item->room < frame->raw_len) {

@@ -4,8 +4,10 @@
  * In: frames of the native protocol, in the order of the stream. Out: for each a device time in the tick at whose end
  * the head released it. Most frames have that time in their header. For points the time follows from their pulses: a
  * head releases packets of SCHEDULE_PACKET pulses, counted from the line's first, once the last pulse of a packet has
- * fired. Where a line, or the scan, ends within a packet, a later frame gives the time. In the pace `step` a head
- * on a live platform does not wait for whole packets. The points of such a head may be assigned a tick too late.
+ * fired. Frames may end within a packet: those of moving meshes do at each tick. Such a frame goes out with its packet
+ * at the latest, and earlier where the line or the scan ends within that packet. Then a later frame whose time is known
+ * gives the time. In the pace `step` a head on a live platform does not wait for whole packets. The points of such a
+ * head may be assigned a tick too late.
  *
  * The time is exact from the scan's start until the rates change, since the stream then says exactly when pulses fire.
  * After that, and where frames are missing, the time is good to a nanosecond, and about one frame in a million may be
@@ -18,7 +20,7 @@
 enum timing_kind {
     TIMING_KNOWN,   /* t_ns; frames before it went out by then */
     TIMING_FOLLOWS, /* as the frame before */
-    TIMING_AT_MOST, /* t_ns, or the time of a later frame where that is earlier */
+    TIMING_AT_MOST, /* t_ns, or the time of the next frame that is TIMING_KNOWN, where that is earlier */
     TIMING_STOPS,   /* the last line of a scan that was stopped: the time of the next event or telemetry; else t_ns */
 };
 

@@ -167,6 +167,8 @@ static void the_reach_is_that_of_the_heads_station(void **state)
     assert_int_equal(device_pose(rig->device, 30000000, (double[6]){5}, NULL), SH_EINPUT);
     assert_int_equal(device_head_pose(rig->device, 15000000, &pose), 0); /* between the two */
     assert_int_equal(device_head_pose(rig->device, 20000000, &pose), 1);
+    assert_int_equal(device_head_pose(rig->device, 24000000, &pose), 1);
+    assert_true(pose.position_m[0] == 0.0); /* the motion from the pose out of reach does not go on */
     rig_close(rig);
 }
 
@@ -179,19 +181,17 @@ static int ride(struct rig *rig, int from_ms, int n)
     return taken;
 }
 
-/* A pose that pulses still need keeps its place, and the pose that would take the place is refused. Here a scan begins
- * while as many poses are there as have room. */
-static void no_pose_is_lost_before_its_time(void **state)
+/* A scan begins while as many poses are there as have room. After 3 s those that no pulse needs any more have made
+ * room: as many as `room_ms` says. */
+static void ride_with(const char *const *sets, int n_sets, int room_ms)
 {
-    (void)state;
-    static const char *const sets[] = {"platform.kind=live", "platform.reach_m=100", "head.frames=0"};
-    struct rig *rig = rig_open(&(struct device_options){.start = 1}, sets, 3);
+    struct rig *rig = rig_open(&(struct device_options){.start = 1}, sets, n_sets);
     struct sh_err err;
     struct pose pose;
     assert_int_equal(ride(rig, 1, 70000), DEVICE_POSES_KEPT);
     assert_int_equal(atomic_load(&device_counters(rig->device)->bad_poses), 70000 - DEVICE_POSES_KEPT);
     assert_int_equal(device_pose(rig->device, INT64_C(80000000000), (double[6]){0}, &err), SH_EINPUT);
-    assert_string_equal(err.text, "a pose has no room: 65536 of them are ahead");
+    assert_string_equal(err.text, "a pose has no room: the 65536 that the head keeps are still needed; send it later");
     rig_wait(rig, NATIVE_EV_SCAN_START, 1000);
     for (int i = 0; i < 500; i++) {
         assert_true(rig_claim(rig));
@@ -201,15 +201,28 @@ static void no_pose_is_lost_before_its_time(void **state)
             assert_true(fabs(knot->pose.position_m[1] - 1e-9 * (double)(rig->work.scan_t0_ns + knot->t_ns)) < 1e-12);
         }
     }
-    rig_go_to(rig,
-              3001); /* poses up to 1 s ago have made room, 1,000 of them; the last 2 s are kept for the receiver */
-    const int taken = ride(rig, DEVICE_POSES_KEPT + 1, 2000);
-    assert_true(taken >= 995 && taken <= 1005);
-    for (int ms = 1010; ms < DEVICE_POSES_KEPT; ms += 997) {
+    rig_go_to(rig, 3001);
+    const int taken = ride(rig, DEVICE_POSES_KEPT + 1, 4000);
+    assert_true(taken >= room_ms - 5 && taken <= room_ms + 5);
+    for (int ms = room_ms + 10; ms < DEVICE_POSES_KEPT; ms += 997) {
         assert_int_equal(device_head_pose(rig->device, ms * INT64_C(1000000), &pose), 1);
         assert_true(fabs(pose.position_m[1] - 1e-3 * ms) < 1e-9);
     }
     rig_close(rig);
+}
+
+/* A pose that pulses still need keeps its place, and the pose that would take the place is refused. Where there is a
+ * receiver, its fixes need the poses of the last 2 s, too. */
+static void no_pose_is_lost_before_its_time(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"platform.kind=live",      "platform.reach_m=100",
+                                       "head.frames=0",           "scene.anchor.source=explicit",
+                                       "scene.anchor.lat_deg=0",  "scene.anchor.lon_deg=11",
+                                       "scene.anchor.height_m=0", "links[0].type=null",
+                                       "links[0].protocol=nmea",  "time.epoch=2026-01-01T00:00:00Z"};
+    ride_with(sets, 3, 3000);
+    ride_with(sets, sizeof sets / sizeof sets[0], 1000);
 }
 
 /* A single pose that is far ahead. Until its time the head is at its station, which is flagged, counted and announced.
@@ -268,32 +281,39 @@ static void a_replay_has_the_poses(void **state)
     assert_memory_equal(again, once, sizeof once);
 }
 
-/* While a journal with poses is replayed, no others are taken; after its last line they are. A journal without poses,
- * as earlier heads wrote it, leaves them to the peer. */
+/* While a journal with poses is replayed, no others are taken. That is up to its END; where it has none, poses are taken
+ * after its last line. A journal without poses, as earlier heads wrote it, leaves them to the peer. */
 static void a_replay_takes_no_other_poses(void **state)
 {
     (void)state;
     static const char *const sets[] = {"platform.kind=live", "loop.pace=step"};
-    static const char *const lines[] = {"0 1000000 0 POSE 1 0 0 0 0 0\n20 9000000 1 HEAD:LINES 50\n",
-                                        "20 9000000 1 HEAD:LINES 50\n"};
+    static const struct {
+        const char *lines;
+        int at_10_ms, at_30_ms; /* whether poses are taken */
+    } rows[] = {{"0 1000000 0 POSE 1 0 0 0 0 0\n20 9000000 1 HEAD:LINES 50\n", 0, 1},
+                {"0 1000000 0 POSE 1 0 0 0 0 0\n40 40000000 0 END\n", 0, 0},
+                {"20 9000000 1 HEAD:LINES 50\n40 40000000 0 END\n", 1, 1},
+                {"20 9000000 1 HEAD:LINES 50\n", 1, 1}};
     const double v[6] = {2};
-    for (int i = 0; i < 2; i++) {
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         struct command_result result;
         struct sh_err err;
         FILE *f = fopen(journal_path, "w");
         assert_non_null(f);
-        fprintf(f, "# scanhead journal 1\n%s", lines[i]);
+        fprintf(f, "# scanhead journal 1\n%s", rows[i].lines);
         assert_int_equal(fclose(f), 0);
         struct rig *rig = rig_open(&(struct device_options){.replay = journal_path}, sets, 2);
         rig_go_to(rig, 10);
-        assert_int_equal(device_pose(rig->device, 5000000, v, &err), i == 0 ? SH_EINPUT : SH_OK);
-        if (i == 0) assert_string_equal(err.text, "a pose came while a journal with poses is being replayed");
+        assert_int_equal(device_pose(rig->device, 5000000, v, &err), rows[i].at_10_ms ? SH_OK : SH_EINPUT);
+        if (!rows[i].at_10_ms)
+            assert_string_equal(err.text, "a pose came while a journal with poses is being replayed");
         device_command(rig->device, 1, "TIME:STEP 1 MS, 1,0,0,0,0,0", 9, &result);
-        assert_int_equal(result.error, i == 0 ? CMD_E_SETTINGS : 0);
+        assert_int_equal(result.error, rows[i].at_10_ms ? 0 : CMD_E_SETTINGS);
         rig_tell(rig, "TIME:STEP 1 MS", 9);
         rig_go_to(rig, 30);
-        assert_int_equal(device_pose(rig->device, 6000000, v, NULL), SH_OK);
-        rig_tell(rig, "TIME:STEP 1 MS, 1,0,0,0,0,0", 29);
+        assert_int_equal(device_pose(rig->device, 6000000, v, NULL), rows[i].at_30_ms ? SH_OK : SH_EINPUT);
+        device_command(rig->device, 1, "TIME:STEP 1 MS, 1,0,0,0,0,0", 29, &result);
+        assert_int_equal(result.error, rows[i].at_30_ms ? 0 : CMD_E_SETTINGS);
         rig_close(rig);
     }
 }
@@ -321,37 +341,15 @@ static void poses_come_in_order(void **state)
     rig_close(rig);
 }
 
-/* The head goes north at 20 m/s, with a fix ten times a second. Each fix is where the head was then, not a tenth of a
- * second further. */
-static void a_fix_is_where_the_head_was(void **state)
+/* A head that isn't on a live platform has no room for poses. */
+static void a_pose_needs_a_live_platform(void **state)
 {
     (void)state;
-    char path[96], set[128];
-    snprintf(path, sizeof path, "%s/north.csv", folder);
-    snprintf(set, sizeof set, "platform.waypoints=%s", path);
-    FILE *f = fopen(path, "w");
-    assert_non_null(f);
-    fputs("x_m,y_m,z_m,speed_m_s\n0,0,0,20\n0,100,0,20\n", f);
-    assert_int_equal(fclose(f), 0);
-    const char *const sets[] = {"platform.kind=trajectory", set,
-                                "stations[1].name=b",       "head.frames=0",
-                                "stations[0].lat_deg=0",    "stations[0].lon_deg=11",
-                                "stations[0].height_m=0",   "stations[1].lat_deg=1",
-                                "stations[1].lon_deg=11",   "stations[1].height_m=0",
-                                "links[0].type=null",       "links[0].protocol=nmea",
-                                "gnss.rate_hz=10",          "time.epoch=2026-01-01T00:00:00Z"};
-    struct rig *rig = rig_open(&(struct device_options){.start = 1}, sets, 14);
-    const int64_t t0_ns = (int64_t)rig_wait(rig, NATIVE_EV_SCAN_START, 1000)->b;
-    rig_go_to(rig, rig->next + 1500);
-    const double e2 = 0.00669437999014, metres_per_deg = 6378137 * (1 - e2) * M_PI / 180; /* WGS 84, at the equator */
-    for (int tenth = 5; tenth < 15; tenth++) {
-        struct nmea_fix fix;
-        assert_int_equal(device_fix(rig->device, tenth * INT64_C(100000000) + 12345, &fix), 1);
-        const double want_m = 20 * fmax(0, 0.1 * tenth - 1e-9 * (double)t0_ns);
-        assert_true(fabs(fix.lat_deg * metres_per_deg - want_m) < 0.01); /* a tenth is 2 m further */
-    }
+    struct rig *rig = rig_open(NULL, NULL, 0);
+    struct sh_err err;
+    assert_int_equal(device_pose(rig->device, 5000000, (double[6]){0}, &err), SH_EINPUT);
+    assert_string_equal(err.text, "a pose needs platform.kind: live");
     rig_close(rig);
-    unlink(path);
 }
 
 /* In lock-step a tick has all pulses that fire within it: none waits for its packet to be whole. At other paces, and
@@ -392,7 +390,7 @@ int main(void)
         cmocka_unit_test(the_reach_is_that_of_the_heads_station),
         cmocka_unit_test(no_pose_is_lost_before_its_time),
         cmocka_unit_test(no_pose_is_used_before_its_time),
-        cmocka_unit_test(a_fix_is_where_the_head_was),
+        cmocka_unit_test(a_pose_needs_a_live_platform),
     };
     return cmocka_run_group_tests_name("device path", tests, make_folder, remove_folder);
 }

@@ -301,6 +301,7 @@ static void speed_and_course_are_those_of_the_way(void **state)
         for (int k = 0; k < 3; k++)
             pose[i]->position_m[k] = at_m[k] + v_m_s[k] * 1e-9 * GNSS_STEP_NS * (i - 1);
     }
+    track.span_ns = 2 * GNSS_STEP_NS;
     gnss_fix(&r.gnss, 0, 0, &track, &fix);
     assert_true(fabs(fix.speed_m_s - 5) < 1e-6);
     assert_true(fabs(fix.course_deg - atan2(3, 4) * 180 / M_PI) < 1e-5);

@@ -20,8 +20,8 @@
 
 enum { PERIOD_NS = 1000 };
 
-/* Writes the first n pulses of a scan, one each microsecond. The head computes 16 at a time. */
-static void put_points(FILE *f, uint32_t n)
+/* Writes n pulses of a scan, one each microsecond. The head computes 16 at a time. */
+static void put_points(FILE *f, uint32_t from, uint32_t n)
 {
     static uint32_t dt_ns[16], zero[16];
     static int16_t refl_cdb[16];
@@ -29,7 +29,8 @@ static void put_points(FILE *f, uint32_t n)
     static uint16_t label[16];
     for (uint32_t i = 0; i < n; i++)
         dt_ns[i] = i * PERIOD_NS;
-    const struct line_block block = {.n_pulses = n,
+    const struct line_block block = {.pulse0 = from,
+                                     .n_pulses = n,
                                      .n_points = n,
                                      .dt_ns = dt_ns,
                                      .a = zero,
@@ -37,7 +38,8 @@ static void put_points(FILE *f, uint32_t n)
                                      .c = zero,
                                      .refl_cdb = refl_cdb,
                                      .echo = echo,
-                                     .label = label};
+                                     .label = label,
+                                     .t0_ns = (int64_t)from * PERIOD_NS};
     recording_put(f, frame, native_encode_points(frame, sizeof frame, &block, 0));
 }
 
@@ -64,7 +66,7 @@ static void points_go_out_with_what_follows(void **state)
         FILE *f = recording_begin(file_path);
         recording_put_head(f, "", 0);
         recording_put_event(f, NATIVE_EV_SCAN_START, 0);
-        put_points(f, 10);
+        put_points(f, 0, 10);
         recording_put_event(f, NATIVE_EV_CONTROL, rows[i].event_ns);
         recording_end(f);
         memset(&r, 0, sizeof r);
@@ -73,6 +75,32 @@ static void points_go_out_with_what_follows(void **state)
         assert_int_equal(time_of(&r, NATIVE_EVENT), rows[i].event_ns);
         recording_close(&r);
     }
+}
+
+/* A line has 20 pulses. Its last packet has the pulses 16 to 19, each in a frame of its own, as of a slow head that
+ * moving meshes split at each tick. So all four went out as the line ended. */
+static void a_line_ends_within_a_packet_of_many_frames(void **state)
+{
+    (void)state;
+    static const struct line_end end = {.n_fired = 20, .n_cast = 20, .t1_ns = 20 * PERIOD_NS};
+    static struct recording r;
+    struct sh_err err;
+    uint8_t frame[1024];
+    FILE *f = recording_begin(file_path);
+    recording_put_head(f, "", 0);
+    recording_put_event(f, NATIVE_EV_SCAN_START, 0);
+    put_points(f, 0, 10);
+    put_points(f, 10, 6);
+    for (uint32_t k = 16; k < 20; k++)
+        put_points(f, k, 1);
+    recording_put(f, frame, native_encode_line_end(frame, sizeof frame, &end, 0));
+    recording_end(f);
+    memset(&r, 0, sizeof r);
+    if (recording_open(&r, file_path, &err) != SH_OK) fail_msg("%s", err.text);
+    for (int i = 0; i < 6; i++)
+        assert_int_equal(time_of(&r, NATIVE_POINTS), i < 2 ? 15 * PERIOD_NS : 19 * PERIOD_NS);
+    assert_int_equal(time_of(&r, NATIVE_LINE_END), 19 * PERIOD_NS);
+    recording_close(&r);
 }
 
 /* The scan was stopped after ten pulses. Its last line went out with the event or the telemetry that follows, else when
@@ -110,7 +138,7 @@ static void it_begins_anew_as_it_began(void **state)
     static struct recording r;
     struct sh_err err;
     FILE *f = recording_begin(file_path);
-    put_points(f, 10);
+    put_points(f, 0, 10);
     recording_put_event(f, NATIVE_EV_CONTROL, 12000);
     recording_put_head(f, "", 0);
     recording_end(f);
@@ -281,6 +309,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(points_go_out_with_what_follows),
+        cmocka_unit_test(a_line_ends_within_a_packet_of_many_frames),
         cmocka_unit_test(the_last_line_of_a_stopped_scan),
         cmocka_unit_test(it_begins_anew_as_it_began),
         cmocka_unit_test(another_head_begins),

@@ -5,17 +5,17 @@
 #include "tests/wire/replay_rig.h"
 
 /* A head boots, spins up, scans and spins down. The head is recorded to the last tick, and replayed with some more. */
-static void same_ticks(struct wire *wire, const struct room_config *c, const struct tape_line *lines, int n)
+static void same_ticks_with(struct wire *wire, const struct room_config *c, const char *const *options,
+                            const struct tape_line *lines, int n)
 {
     const struct tape_line start[] = {{3, "SCAN:STARt"}, {0, NULL}};
     const char *const link[] = {"--link", "type: tcp, port: 0", NULL};
-    const char *const threads[] = {"--threads", "1", NULL};
     struct room_config config = *c;
     struct tape head = {0}, replay = {0};
     char file[352];
     room_write(wire);
     config.links = LINK_YAML_TCP;
-    tape_step(wire, room_config_write(wire, &config), threads, lines, n, &head);
+    tape_step(wire, room_config_write(wire, &config), options, lines, n, &head);
     snprintf(file, sizeof file, "%s", tape_write(wire, "head.shs", &head));
     tape_step(wire, file, link, start, n + 10, &replay);
     tape_keep_common(&head);
@@ -24,6 +24,12 @@ static void same_ticks(struct wire *wire, const struct room_config *c, const str
     tape_same_ticks(&replay, &head);
     tape_free(&head);
     tape_free(&replay);
+}
+
+static void same_ticks(struct wire *wire, const struct room_config *c, const struct tape_line *lines, int n)
+{
+    static const char *const threads[] = {"--threads", "1", NULL};
+    same_ticks_with(wire, c, threads, lines, n);
 }
 
 /* 32.5 of 100 degrees are cast, so a line's packets end before it does. */
@@ -109,6 +115,28 @@ static void test_a_head_that_moves(void **state)
     same_ticks(*state, &config, lines, 800);
 }
 
+/* There are one or two pulses in a tick. So they have a frame of their own, at whose start the mesh is moved, and the
+ * last packet of a line has many frames. */
+static void test_a_mesh_that_moves(void **state)
+{
+    static const struct room_config config[] = {
+        {.prr_hz = 1000, .lines_hz = 12.3, .pan_deg_s = 20, .pan_stop_deg = 20, .frames = 1},
+        {.profile = "own.yaml", .prr_hz = 1440, .lines_hz = 40, .frames = 1}};
+    static const struct tape_line lines[] = {{330, "SCAN:STARt"}, {0, NULL}};
+    char file[384];
+    snprintf(file, sizeof file, "scene.meshes[1].file=%s", wire_path(*state, "gate.obj"));
+    const char *const options[] = {"--threads", "1",
+                                   "--set",     file,
+                                   "--set",     "scene.meshes[1].scale=1",
+                                   "--set",     "scene.meshes[1].up=z",
+                                   "--set",     "scene.meshes[1].move_m_s=[1,0,0]",
+                                   NULL};
+    wire_write_text(*state, "gate.obj", "v 0 1 -1\nv 1 1 -1\nv 0 1 1\no gate\nf 1 2 3\n");
+    emitter_write_profile(*state, "emitter: sphere\nstep_deg: {value: 10, from: assumed}\n");
+    for (int i = 0; i < 2; i++)
+        same_ticks_with(*state, &config[i], options, lines, i == 0 ? 1600 : 1000);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -119,6 +147,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_one_plane, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_a_sphere, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_a_head_that_moves, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_a_mesh_that_moves, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -258,10 +258,11 @@ static int record_run(int argc, char **argv)
     if (raw_is_wanted(argc, argv)) return raw_record(argc, argv);
     int status = record_line_read(&r, argc, argv);
     if (status != APP_GO_ON) return status;
-    if (app_check_files(&r.in, NULL, &err) != SH_OK) return app_fail(&err);
     app_catch_signals();
+    /* app_with_config checks files, too, and knows those that the configuration reads: it names the better reason. */
+    if (r.n_repairs == 0 && is_config(r.job.source)) return app_with_config(&r.in, record_config, &r.job);
+    if (app_check_files(&r.in, NULL, &err) != SH_OK) return app_fail(&err);
     if (r.n_repairs > 0) return record_repair(r.repair, r.n_repairs, r.job.stats, r.quiet);
-    if (is_config(r.job.source)) return app_with_config(&r.in, record_config, &r.job);
     if (!is_stream(r.job.source))
         return app_usage(
             &app_record,
