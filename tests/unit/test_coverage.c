@@ -74,7 +74,7 @@ static void count_progress(void *ctx, const char *what, double fraction)
     assert_near("progress", fraction, ++*(int *)ctx / 5.0, 1e-12);
 }
 
-/* The last 420 of 720 lines are a segment of their own: their pulses alone are cast, 151,200 in five parts of 32,768. */
+/* The last 420 of 720 lines are a segment of their own: their 151,200 pulses alone are cast in five parts of 32,768. */
 static void test_later_segment(void **state)
 {
     (void)state;
