@@ -59,9 +59,7 @@ static char *add_part(struct image *image, const char *name)
     char *text = find_part(image, name);
     if (text != NULL || image->n == MAX_NAMES || strlen(name) >= NAME_LEN) return text;
     strcpy(image->part[image->n].name, name);
-    text = image->part[image->n++].text;
-    text[0] = '\0';
-    return text;
+    return image->part[image->n++].text; /* empty, as all of the image is zeros at first */
 }
 
 static int is_printable(const char *line, size_t len)

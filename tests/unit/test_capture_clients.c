@@ -23,6 +23,21 @@ static void test_pipelined_turns(void **state)
     client_close(&c);
 }
 
+/* A device that greets its client, and answers one request: the connection's messages and the request's are apart. */
+static void test_a_greeting_and_an_answer(void **state)
+{
+    (void)state;
+    made_begin(&m);
+    made_connect(&m, 0);
+    made_say(&m, 4, 1, "hi\n");
+    made_say(&m, 10, 0, "a\n");
+    made_say(&m, 13, 1, "one\n");
+    client_open(&c, &m, 0, NULL);
+    assert_string_equal(client_ask(&c, "", 5), "4:hi\n|");
+    assert_non_null(strstr(client_ask(&c, "a\n", 5), ":one\n|"));
+    client_close(&c);
+}
+
 /* Many more requests than can be answered at a time: none is lost, also where the client sends more than fits. */
 static void test_pipelined_flood(void **state)
 {
@@ -118,9 +133,9 @@ static void test_datagrams_stay_apart(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_pipelined_turns),      cmocka_unit_test(test_pipelined_flood),
-        cmocka_unit_test(test_endless_request),      cmocka_unit_test(test_long_answer),
-        cmocka_unit_test(test_datagrams_stay_apart),
+        cmocka_unit_test(test_pipelined_turns), cmocka_unit_test(test_a_greeting_and_an_answer),
+        cmocka_unit_test(test_pipelined_flood), cmocka_unit_test(test_endless_request),
+        cmocka_unit_test(test_long_answer),     cmocka_unit_test(test_datagrams_stay_apart),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -199,6 +199,24 @@ static void far_fields_have_a_scale_for_it(void **state)
     cola_expect("sRN field000", "sRA field000 3F800000 00000000 D05 FFF92230 2 1 1 1 195 FFFF FFFE 0 0 0 1 0 0");
 }
 
+/* A polygon's farthest corner, at 500 m, gives the scale of 8 mm. The corners are as above, at the beams 405 and 435,
+ * where they are 125, 62500 and 250 counts away. */
+static void far_polygons_have_a_scale_for_it(void **state)
+{
+    (void)state;
+    static const double corner[3][2] = {{90, 1e6}, {90.1, 500e6}, {100, 2e6}}; /* degrees, um */
+    static struct cola_fields f;
+    f.field[0].shape.kind = COLA_SHAPE_POLYGON;
+    for (int k = 0; k < 3; k++) {
+        const double rad = corner[k][0] / 180 * M_PI;
+        assert_int_equal(cola_shape_add(&f.field[0].shape, corner[k][1] * cos(rad), corner[k][1] * sin(rad)), 0);
+    }
+    open_tim();
+    fields_open(&f);
+    cola_expect("sRN field000",
+                "sRA field000 41000000 00000000 D05 FFF92230 2 1 1 2 195 7D F424 1B3 FA FA 0 0 0 1 0 0");
+}
+
 /* ---- evaluation */
 
 /* Field 1: 0.5 to 2 m between the beams 300 and 500. */
@@ -409,6 +427,7 @@ int main(void)
         CASE(directions_are_taken_modulo_a_turn),
         CASE(a_record_reaches_to_the_ends_of_the_view),
         CASE(far_fields_have_a_scale_for_it),
+        CASE(far_polygons_have_a_scale_for_it),
         CASE(corners_at_one_beam_are_one_point),
         CASE(a_record_of_a_sector_spreads_its_points),
         CASE(a_rectangle_begins_at_zero_or_at_the_first_beam),

@@ -68,6 +68,31 @@ static void test_area_is_kept(void **state)
     }
 }
 
+static void count_progress(void *ctx, const char *what, double fraction)
+{
+    assert_string_equal(what, "scan");
+    assert_near("progress", fraction, ++*(int *)ctx / 5.0, 1e-12);
+}
+
+/* The last 420 of 720 lines are a segment of their own: their 151,200 pulses alone are cast in five parts of 32,768. */
+static void test_later_segment(void **state)
+{
+    (void)state;
+    struct cover *c = cover_open(cover_box(LO, HI), 1.0, 1);
+    struct coverage_scan scan;
+    struct coverage_pulses pulses;
+    struct sh_err err;
+    int n = 0;
+    const struct sh_report report = {.ctx = &n, .progress = count_progress};
+    cover_scan(c, WITHIN, &cover_everywhere, &scan);
+    const struct schedule_segment whole = scan.segment;
+    schedule_change(&scan.segment, &whole, &whole.spec, 360 * 300);
+    assert_int_equal(coverage_look(c->coverage, &scan, "scan", &report, &pulses, &err), SH_OK);
+    assert_int_equal(pulses.cast, 360 * 420);
+    assert_int_equal(n, 5);
+    cover_close(c);
+}
+
 /* All of a box is seen from inside if each cell holds a circle larger than any gap between the points. Much smaller
  * cells are not all seen. */
 static void test_box(void **state)
@@ -428,6 +453,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
 #ifndef SH_SANITIZE /* millions of pulses */
         cmocka_unit_test(test_box),
+        cmocka_unit_test(test_later_segment),
         cmocka_unit_test(test_range_limit),
         cmocka_unit_test(test_l_from_the_right),
         cmocka_unit_test(test_l_from_above),

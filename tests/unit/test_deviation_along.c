@@ -191,6 +191,24 @@ static void points_without_a_deviation(void **state)
     close_scene();
 }
 
+/* A beam that passes beside the wall hits nothing. The wall is the nearest surface, 5 cm from the point, and the one
+ * that counts as met, but there is no deviation along the beam. */
+static void a_beam_beside_the_scene(void **state)
+{
+    (void)state;
+    uint32_t met[1];
+    open_scene(WALL);
+    out.met = met;
+    add(50.05, 10, 0);
+    compare();
+    assert_true(fabs(distance_m[0] - 0.05) < 1e-9 && triangle[0] != CLOUD_TRIANGLE_NONE);
+    follow();
+    assert_true(isnan(out.along_m[0]) && isnan(out.sigma_m[0]) && isnan(out.counts_m[0]) && isnan(out.cosine[0]));
+    assert_int_equal(met[0], triangle[0]);
+    out.met = NULL;
+    close_scene();
+}
+
 /* Stations take turns, each by one or more points; one of them is 4 m to the right. Every point has its own deviation,
  * also the only one of a cloud, and the last of many. */
 static void stations_and_numbers(void **state)
@@ -336,11 +354,17 @@ static void sigma_straight_up(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(footprints_beside_an_edge),  cmocka_unit_test(footprints_over_a_step),
-        cmocka_unit_test(what_the_beam_meets),        cmocka_unit_test(distances_that_fit),
-        cmocka_unit_test(points_without_a_deviation), cmocka_unit_test(stations_and_numbers),
-        cmocka_unit_test(surfaces_that_are_near),     cmocka_unit_test(a_stop_is_heard),
-        cmocka_unit_test(points_near_the_head),       cmocka_unit_test(sigma_by_the_signal),
+        cmocka_unit_test(footprints_beside_an_edge),
+        cmocka_unit_test(footprints_over_a_step),
+        cmocka_unit_test(what_the_beam_meets),
+        cmocka_unit_test(distances_that_fit),
+        cmocka_unit_test(points_without_a_deviation),
+        cmocka_unit_test(a_beam_beside_the_scene),
+        cmocka_unit_test(stations_and_numbers),
+        cmocka_unit_test(surfaces_that_are_near),
+        cmocka_unit_test(a_stop_is_heard),
+        cmocka_unit_test(points_near_the_head),
+        cmocka_unit_test(sigma_by_the_signal),
         cmocka_unit_test(sigma_straight_up),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

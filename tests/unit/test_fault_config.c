@@ -226,6 +226,9 @@ static void faults_stand_in_the_configuration_and_in_scenarios(void **state)
     write_in("scenario.yaml", "faults:\n  - {kind: flip, m: 2}\n");
     assert_int_equal(config_add_scenario(cfg, path, &wrong), SH_EINPUT);
     assert_non_null(strstr(wrong.err[0].text, "scenario.yaml:2: faults[0].m: unknown key"));
+    write_in("scenario.yaml", "faults:\n  - {kind: flip, n: 2}\n---\n{}\n");
+    assert_int_equal(config_add_scenario(cfg, path, &wrong), SH_EINPUT);
+    assert_non_null(strstr(wrong.err[0].text, "scenario.yaml:4: a second document; allowed one"));
     write_in("scenario.yaml", "head: {}\n");
     assert_int_equal(config_add_scenario(cfg, path, &wrong), SH_EINPUT);
     write_in("scenario.yaml", "faults: []\n");

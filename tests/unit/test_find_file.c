@@ -121,6 +121,8 @@ static void whole_paths(void **state)
     const char *const one[1] = {second}, *const here[1] = {""};
     path_of(path, "a/Wood.PNG");
     expect(one, 1, path, "a/Wood.PNG");
+    path_of(path, "a/WOOD.png"); /* no other case of it counts, but the name in the folder does */
+    expect(one, 1, path, "b/wood.png");
     assert_non_null(getcwd(before, sizeof before));
     assert_int_equal(chdir(first), 0);
     char *got = scene_find_file(here, 1, "wood.png", 1);

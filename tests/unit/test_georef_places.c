@@ -257,8 +257,17 @@ static void test_refusals(void **state)
         if (strstr(err.text, bad[i].part) == NULL) fail_msg("'%s' without '%s'", err.text, bad[i].part);
         assert_null(strchr(err.text, '\n'));
     }
-    struct georef_place at;
+    struct georef_place at = {.lat_deg = 48, .lon_deg = 16};
+    struct locate_grid grid;
     struct sh_err err = {0, ""};
+    /* GeographicLib's reason is in parentheses. Where it is not asked, there are none. */
+    assert_int_equal(locate_in_grid(&at, 10, &grid, &err), SH_EINPUT);
+    assert_non_null(strstr(err.text, "UTM zone 10 does not reach latitude 48, longitude 16 ("));
+    assert_int_equal(err.text[strlen(err.text) - 1], ')');
+    assert_int_equal(locate_in_grid(&at, 61, &grid, &err), SH_EINPUT);
+    assert_string_equal(err.text, "UTM zone 61 does not reach latitude 48, longitude 16");
+    at.lon_deg = 177; /* the last zone's middle */
+    assert_int_equal(locate_in_grid(&at, 60, &grid, &err), SH_OK);
     assert_int_equal(georef_locate_utm(0, 1, (const double[3]){9e6, 2e6, 0}, &at, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, "9000000.000 E 2000000.000 N is not in UPS N"));
     assert_int_equal(georef_locate_utm(33, 0, (const double[3]){9e6, 2e6, 0}, &at, &err), SH_EINPUT);

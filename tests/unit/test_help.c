@@ -93,6 +93,8 @@ static int record_run(int argc, char **argv)
 }
 
 static const struct app_command *const COMMANDS[] = {&alpha, &record, NULL};
+static const struct app_command *const RECORD_FIRST[] = {&record, &alpha, NULL};
+static const struct app_command *const *commands = COMMANDS;
 
 /* Returns what `help WORDS` prints to the stream; free it. */
 static char *printed(FILE *stream, const char *words, int want)
@@ -104,7 +106,7 @@ static char *printed(FILE *stream, const char *words, int want)
     for (char *word; (word = strsep(&at, " ")) != NULL;)
         if (*word != '\0') argv[argc++] = word;
     output_take(&output, stream);
-    const int status = help_run(COMMANDS, argc, argv);
+    const int status = help_run(commands, argc, argv);
     char *text = output_give(&output);
     if (status != want) fail_msg("help %s: status %d, %s", words, status, text);
     return text;
@@ -255,6 +257,10 @@ static void pages_of_all_commands(void **state)
     expect("--man list", "scanheadd.1\nscanheadd-alpha.1\nscanheadd-record.1\nscanheadd-help.1\n"
                          "scanheadd-record-raw.1\nscanhead.yaml.5\n");
     app_program = "scanhead";
+    commands = RECORD_FIRST;
+    expect("--man list", "scanhead.1\nscanhead-record.1\nscanhead-alpha.1\nscanhead-help.1\nscanhead-record-raw.1\n"
+                         "scanhead.yaml.5\n");
+    commands = COMMANDS;
 }
 
 static void the_page_of_the_program(void **state)

@@ -75,6 +75,36 @@ static void test_kinds(void **state)
     las_waves_close(&waves);
 }
 
+/* Up to 8 samples are never rounded up, from there to 16 samples to even numbers. The window of
+ * another digitiser comes after 128 kinds. */
+static void test_short_kinds(void **state)
+{
+    (void)state;
+    static const uint32_t want[] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 10, 12, 12, 14, 14, 16, 16};
+    enum { EXACT = 128, LONGEST = sizeof want / sizeof want[0] - 1 };
+    static uint8_t sample[2 * EXACT];
+    struct scanhead_wave wave = {.sample = sample, .sample_ps = 1000, .bits = 12, .count_signal = 1};
+    struct las_packet packet;
+    struct sh_err err = {0};
+    int is_new;
+    for (uint32_t n = 1; n <= LONGEST; n++) {
+        struct las_waves waves = {.n_kinds = 0};
+        assert_int_equal(las_waves_open(&waves, rig_path("a.las"), &err), 0);
+        wave.sample_ps = 1000;
+        for (uint32_t k = 1; k <= EXACT; k++) {
+            wave.pulse = wave.n = (uint16_t)k;
+            assert_int_equal(las_waves_put(&waves, 1, &wave, &packet, &is_new, &err), 0);
+        }
+        wave.sample_ps = 2000;
+        wave.pulse++;
+        wave.n = (uint16_t)n;
+        assert_int_equal(las_waves_put(&waves, 1, &wave, &packet, &is_new, &err), 0);
+        assert_true(is_new);
+        assert_int_equal(packet.len, 2 * want[n]);
+        las_waves_close(&waves);
+    }
+}
+
 /* Puts a window, which must get the packet of that kind, new or not. */
 static void put(struct las_waves *waves, const struct scanhead_wave *wave, uint32_t kind, int want_new)
 {
@@ -186,8 +216,8 @@ static void test_fill(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_large), cmocka_unit_test(test_kinds),
-                                       cmocka_unit_test(test_no_kind_left), cmocka_unit_test(test_cut_before_copy),
-                                       cmocka_unit_test(test_fill)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_large),           cmocka_unit_test(test_kinds),
+                                       cmocka_unit_test(test_short_kinds),     cmocka_unit_test(test_no_kind_left),
+                                       cmocka_unit_test(test_cut_before_copy), cmocka_unit_test(test_fill)};
     return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
 }

@@ -129,6 +129,34 @@ static void scale_says_its_length(void **state)
     }
 }
 
+/* The colours begin at the label 0, have no gap, and end where the label of the high end ends. */
+static void colours_reach_from_label_to_label(void **state)
+{
+    (void)state;
+    struct map *map = make(60, 0.1);
+    double from = 0, to = 0;
+    add(map, 1, 1, 0.0);
+    add(map, 2, 2, 3.0);
+    char *svg = svg_of(map), *legend = group_of(svg, "legend");
+    assert_non_null(legend);
+    const char *text = strstr(legend, "<text ");
+    assert_non_null(text);
+    assert_int_equal(sscanf(text, "<text x=\"%lf\"", &from), 1);
+    text = strstr(text + 1, "<text ");
+    assert_non_null(text);
+    assert_int_equal(sscanf(text, "<text x=\"%lf\"", &to), 1);
+    assert_true(to > from);
+    for (const char *p = strstr(legend, "<rect "); p != NULL; p = strstr(p + 1, "<rect ")) {
+        long x, y, width;
+        assert_int_equal(sscanf(p, "<rect x=\"%ld\" y=\"%ld\" width=\"%ld\"", &x, &y, &width), 3);
+        assert_true((double)x == from);
+        from += (double)width;
+    }
+    assert_true(from == to);
+    free(legend);
+    free(svg);
+}
+
 /* The arrow's tip is above its feet, in the middle of them, and in the image. */
 static void north_is_up(void **state)
 {
@@ -224,9 +252,10 @@ static void ticks_point_where_stations_look(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(heights_of_the_corners_count), cmocka_unit_test(few_strays_change_no_hues),
-        cmocka_unit_test(scale_says_its_length),        cmocka_unit_test(north_is_up),
-        cmocka_unit_test(lines_end_at_the_border),      cmocka_unit_test(ticks_point_where_stations_look),
+        cmocka_unit_test(heights_of_the_corners_count),    cmocka_unit_test(few_strays_change_no_hues),
+        cmocka_unit_test(scale_says_its_length),           cmocka_unit_test(north_is_up),
+        cmocka_unit_test(lines_end_at_the_border),         cmocka_unit_test(colours_reach_from_label_to_label),
+        cmocka_unit_test(ticks_point_where_stations_look),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -86,6 +86,27 @@ static void each_part_has_a_ray_on_both_sides(void **state)
     }
 }
 
+/* An edge that leads away, from 9 m to 11 m ahead and 1 m aside, has ten parts of 0.2 m. Both sides see something else
+ * at 10 m, so parts beyond it are hidden. A part that is y ahead is at hypot(1, y): the one at 9.9 m is 9.95 m away,
+ * and the next one 10.15 m. A neighbour of a part that counts does, too. */
+static void parts_are_hidden_by_their_own_range(void **state)
+{
+    (void)state;
+    static const double near[3] = {1.0, 9.0, 0.0}, far[3] = {1.0, 11.0, 0.0};
+    static struct outline_prober prober;
+    struct beam beam;
+    struct sides sides = {10.0, 10.0, 1, 2, -2.0, 2.0, 0, 0.0, 0.0};
+    const struct beam_probe how = {see, &sides};
+    beam_init(&beam, 0.0, 2.0 * 0.2 / 10.0 * (1.0 + 1e-9), 4e-9);
+    prober.probe = &how;
+    prober.beam = &beam;
+    for (int away = 0; away < 2; away++) {
+        assert_int_equal(outline_probe(&prober, away ? near : far, away ? far : near, 10.0), 10);
+        for (int i = 0; i < 10; i++)
+            assert_int_equal(prober.counts[away ? i : 9 - i], i <= 5);
+    }
+}
+
 static void what_counts_as_a_step(void **state)
 {
     (void)state;
@@ -394,6 +415,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(each_part_has_a_ray_on_both_sides),
+        cmocka_unit_test(parts_are_hidden_by_their_own_range),
         cmocka_unit_test(what_counts_as_a_step),
         cmocka_unit_test(neighbours_of_a_step_count),
         cmocka_unit_test(lines_across_a_footprint),

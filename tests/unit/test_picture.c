@@ -278,6 +278,37 @@ static void texts_have_their_strokes(void **state)
     picture_free(&p);
 }
 
+/* Pixel at a place of a glyph's grid, where picture_text drew the glyph with its left end at (10, 44). */
+static double ink_of_glyph(const struct picture *p, double x, double y)
+{
+    return ink(p, (uint32_t)floor(10 + x), (uint32_t)floor(44 - y));
+}
+
+/* The four arcs of O go from the middle of one side to the middle of the next, and the corner draws them. So the middle
+ * of an arc is half way from the corner to the middle of the chord, which is 4.3 units from the arc and has no ink.
+ * 4 has an upright at 14, and the bow of ( ends 7 to the right of its middle. */
+static void glyphs_have_their_shape(void **state)
+{
+    (void)state;
+    struct picture p = blank(60, 60);
+    picture_text(&p, (const double[2]){10, 44}, PICTURE_LEFT, &TALL, black, "O");
+    for (int k = 0; k < 4; k++) {
+        const double to_x = k & 1 ? 1 : -1, to_y = k & 2 ? 1 : -1;
+        assert_true(ink_of_glyph(&p, 11 + to_x * 0.75 * 11, 14 + to_y * 0.75 * 14) >= 1);
+        assert_true(ink_of_glyph(&p, 11 + to_x * 0.5 * 11, 14 + to_y * 0.5 * 14) <= 0);
+    }
+    picture_fill(&p, 0, 0, 60, 60, white);
+    picture_text(&p, (const double[2]){10, 44}, PICTURE_LEFT, &TALL, black, "4");
+    for (double y = 0; y <= 28; y++)
+        assert_true(ink_of_glyph(&p, 14, y) >= 1);
+    assert_true(ink_of_glyph(&p, 4, 1) <= 0);
+    picture_fill(&p, 0, 0, 60, 60, white);
+    picture_text(&p, (const double[2]){10, 44}, PICTURE_LEFT, &TALL, black, "(");
+    assert_true(ink_of_glyph(&p, 7, 32) >= 1 && ink_of_glyph(&p, 0, 12) >= 1 && ink_of_glyph(&p, 7, -8) >= 1);
+    assert_true(ink_of_glyph(&p, 7, 12) <= 0);
+    picture_free(&p);
+}
+
 static char *svg_text(void (*draw)(struct pen *pen))
 {
     struct svg *svg;
@@ -400,6 +431,7 @@ int main(void)
         cmocka_unit_test(accents_add_no_width),
         cmocka_unit_test(wrong_bytes_are_boxes),
         cmocka_unit_test(texts_have_their_strokes),
+        cmocka_unit_test(glyphs_have_their_shape),
         cmocka_unit_test(the_reason_of_a_failed_write),
         cmocka_unit_test(elements_of_an_svg),
         cmocka_unit_test(texts_of_an_svg),

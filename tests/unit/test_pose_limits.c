@@ -6,8 +6,8 @@
 #include "tests/unit/file_rig.h"
 #include "tests/unit/pose_rig.h"
 
-/* Writes the columns and up to two lines. `says` is what follows the file's name in the message; NULL: the file is
- * right. */
+/* Writes the columns and up to two lines. `says` is in the message, after the file's name, and right after it where it
+ * begins with a colon; NULL: the file is right. */
 static void expect_file(int of_waypoints, const char *columns, const char *lines, const char *says)
 {
     struct trajectory *tr;
@@ -24,7 +24,8 @@ static void expect_file(int of_waypoints, const char *columns, const char *lines
         return;
     }
     assert_null(tr);
-    if (strncmp(err.text, file_path, strlen(file_path)) != 0 || strstr(err.text, says) == NULL)
+    const char *rest = err.text + strlen(file_path), *at = strstr(err.text, says);
+    if (strncmp(err.text, file_path, strlen(file_path)) != 0 || at == NULL || (says[0] == ':' && at != rest))
         fail_msg("%s", err.text);
 }
 

@@ -342,6 +342,25 @@ static void test_refused(void **state)
     remove_state();
 }
 
+/* A header that is cut goes, with all its lines: none, one or more of them are whole. */
+static void test_headers_that_are_cut(void **state)
+{
+    (void)state;
+    static const char grid[] = "1\n1\n" POSE "0 0 0 0.5\n", next[] = "12\n34\n" POSE;
+    const size_t whole_grid = sizeof grid - 1;
+    for (size_t more = 0; more < sizeof next; more++) {
+        char text[2 * sizeof grid + sizeof next];
+        size_t len;
+        snprintf(text, sizeof text, "%s%.*s", grid, (int)more, next);
+        write_state(text, strlen(text), NULL, 0);
+        uint8_t *now = repair_well(0, &len);
+        assert_int_equal(len, whole_grid);
+        assert_memory_equal(now, grid, whole_grid);
+        free(now);
+    }
+    remove_state();
+}
+
 /* Cells of a killed recorder never go back. A cell at the end that does is no cell of this grid, and is cut. */
 static void test_cell_that_goes_back(void **state)
 {
@@ -423,8 +442,13 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_killed),    cmocka_unit_test(test_completing), cmocka_unit_test(test_text_alone),
-        cmocka_unit_test(test_refused),   cmocka_unit_test(test_line_ends),  cmocka_unit_test(test_cell_that_goes_back),
+        cmocka_unit_test(test_killed),
+        cmocka_unit_test(test_completing),
+        cmocka_unit_test(test_text_alone),
+        cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_headers_that_are_cut),
+        cmocka_unit_test(test_line_ends),
+        cmocka_unit_test(test_cell_that_goes_back),
         cmocka_unit_test(test_full_disk),
     };
     return cmocka_run_group_tests(tests, rig_set_up, tear_down);

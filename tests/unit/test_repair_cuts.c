@@ -230,6 +230,12 @@ static void test_huge_numbers(void **state)
     assert_int_equal(file.n_kept, 2);
     assert_memory_equal(got.data, "ply\nformat ascii 1.0\ncomment crs x \nelement vertex 2\n", 53);
     free(got.data);
+    /* The first comment alone gets the blank. */
+    static const char comments[] =
+        "ply\nformat ascii 1.0\ncomment crs x\ncomment b\nelement vertex 10\nproperty double x\nend_header\n1\n2\n";
+    assert_int_equal(repair(comments, sizeof comments - 1, &file, &got), 1);
+    assert_memory_equal(got.data, "ply\nformat ascii 1.0\ncomment crs x \ncomment b\nelement vertex 2\n", 63);
+    free(got.data);
     static const struct {
         size_t at;
         uint8_t value[4];

@@ -61,6 +61,7 @@ static void test_bars_stand_on_the_axis(void **state)
 {
     (void)state;
     char *svg = drawn(draw_histogram);
+    assert_non_null(strstr(svg, " viewBox=\"0 0 640 272\" "));
     const char *at = svg;
     struct rect bar[5];
     int n = 0;

@@ -94,6 +94,7 @@ static void a_picture_that_is_none(void **state)
 {
     (void)state;
     static const char *const sets[] = {"scene.cutouts=off"};
+    static const char *const signals[] = {"scene.cutouts=off", "output.colour=range", "signal.model=on"};
     char want[512];
     write_in("wall.mtl", "newmtl brick\nKd 1 0 0\nmap_Kd wall.png\nnewmtl tile\nKd 0 1 0\nmap_Kd wall.png\n");
     write_in("wall.png", "no picture");
@@ -113,6 +114,16 @@ static void a_picture_that_is_none(void **state)
              config_path);
     if (strncmp(warned, want, strlen(want)) != 0) fail_msg("%s", warned);
     assert_non_null(strstr(warned, "/wall.png: "));
+    /* The signal does without the picture, too. */
+    clear_warned();
+    site_free(site);
+    site = NULL;
+    if (config_load(config_path, signals, 3, cfg, &err) != SH_OK) fail_msg("%s", err.text);
+    if (site_load(cfg, &report, &site, &err) != SH_OK) fail_msg("%s", err.text);
+    snprintf(want, sizeof want,
+             "%s: 2 surfaces have a texture that is not used: their colour is used, or signal.reflectance; the first: ",
+             config_path);
+    if (strstr(warned, want) == NULL) fail_msg("%s", warned);
 }
 
 static int teardown(void **state)

@@ -102,6 +102,7 @@ static void lengths(void **state)
     assert_int_equal(scip->request_len(BYTES("BM\nQT\n")), 3);
     assert_int_equal(scip->request_len(BYTES("BM\rQT\n")), 3);
     assert_int_equal(scip->request_len(BYTES("BM")), 0);
+    assert_int_equal(scip->request_len(BYTES("\nBM\n")), 1); /* an empty line is a line by itself */
     assert_int_equal(scip->answer_len(BYTES("BM\n00P\n\nQ")), 8);
     assert_int_equal(scip->answer_len(BYTES("BM\n00P\n")), 0);
     assert_int_equal(scip->answer_len(BYTES("\n\n")), 2);

@@ -40,7 +40,10 @@ static void polygons_keep_their_area(void **state)
                                      {5, 5}, {4, 1}, {3, 5}, {2, 1}, {1, 5}, {0.5, 1}};
     static const double keyhole[][2] = {{0, 0}, {1, 1}, {1, 2}, {2, 2}, {2, 1}, {1, 1}, {0, 0}, {3, 0}, {3, 3}, {0, 3}};
     static const double repeated[][2] = {{0, 0}, {2, 0}, {2, 0}, {2, 2}, {1, 1}, {0, 2}, {0, 2}};
+    /* A triangle of 1 m2 with a spike at two corners, (0, 1) and (1, 3). Both have no area, and each blocks an ear. */
+    static const double spikes[][2] = {{1, 1}, {0, 1}, {3, 1}, {1, 2}, {1, 3}};
     for (int at_utm = 0; at_utm < 2; at_utm++) {
+        check_polygon(spikes, 5, at_utm);
         check_polygon(l_shape, 6, at_utm);
         check_polygon(dart, 4, at_utm);
         check_polygon(on_edges, 8, at_utm);

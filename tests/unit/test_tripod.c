@@ -149,6 +149,8 @@ static void holes_by_height(void **state)
         struct site *site = load(text);
         if (strstr(warned, cases[i].says) == NULL) fail_msg("%s", warned);
         if (cases[i].says[0] == '\0') assert_string_equal(warned, "");
+        site_describe_tripod(&site->station[0], text, sizeof text);
+        assert_int_equal(strstr(text, " above the ground, hovering; opening ") != NULL, cases[i].says[0] != '\0');
         scan(site, 0);
         check_holes(cases[i].z, cases[i].slope, cases[i].cos_opening);
         site_free(site);

@@ -436,6 +436,23 @@ static void test_functions(void **state)
     assert_null(usb_personality_get(USB_N_PERSONALITIES));
 }
 
+/* A session with an interrupt endpoint is that of a port: the first of its interfaces has it, and no other endpoint. */
+static void test_notifications(void **state)
+{
+    (void)state;
+    for (int id = 0; id < USB_N_PERSONALITIES; id++) {
+        const struct usb_personality *p = usb_personality_get((enum usb_personality_id)id);
+        for (int s = 0; s < p->n_sessions; s++) {
+            const struct usb_interface_row *of = &p->model->interface[p->session[s].interface];
+            if (of->class == USB_CLASS_COMM) {
+                assert_true(of->n_endpoints == 1 && of->endpoint[0].type == USB_ENDPOINT_XFER_INT);
+                assert_int_equal(p->session[s].notify, of->endpoint[0].address);
+            } else
+                assert_int_equal(p->session[s].notify, 0);
+        }
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -443,7 +460,8 @@ int main(void)
         cmocka_unit_test(test_status),           cmocka_unit_test(test_port),
         cmocka_unit_test(test_line_coding),      cmocka_unit_test(test_serial_state),
         cmocka_unit_test(test_foreign_requests), cmocka_unit_test(test_cut),
-        cmocka_unit_test(test_functions),        cmocka_unit_test(test_own_requests),
+        cmocka_unit_test(test_functions),        cmocka_unit_test(test_notifications),
+        cmocka_unit_test(test_own_requests),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

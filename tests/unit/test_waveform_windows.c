@@ -338,6 +338,28 @@ static void no_room_is_counted(void **state)
     waveform_free(w);
 }
 
+/* Three windows fill the room to its end, with noise and without, and what lies behind it stays. */
+static void windows_end_with_the_room(void **state)
+{
+    (void)state;
+    const struct waveform_return r[] = {point(100.0, 10.0), point(160.0, 10.0), point(220.0, 10.0)};
+    for (int noisy = 0; noisy < 2; noisy++) {
+        struct waveform_spec spec = waveform_rig_spec();
+        struct waveform_record record;
+        spec.noise = noisy;
+        struct waveform *w = waveform_rig_open(&spec);
+        record_into(w, 0, r, 3, &record);
+        const uint32_t n = record.n_samples;
+        assert_int_equal(record.n_windows, 3);
+        record.capacity = n;
+        sample[n] = 0xbeef;
+        waveform_sample(w, 0, 0, r, 3, &record);
+        assert_int_equal(record.n_samples, n);
+        assert_int_equal(sample[n], 0xbeef);
+        waveform_free(w);
+    }
+}
+
 /* Nothing is sampled before the emission: the window of a return at 0 begins there. */
 static void windows_begin_at_the_emission(void **state)
 {
@@ -364,6 +386,7 @@ int main(void)
                                        cmocka_unit_test(a_receiver_saturates_and_recovers),
                                        cmocka_unit_test(saturation_lies_outside_of_windows),
                                        cmocka_unit_test(no_room_is_counted),
+                                       cmocka_unit_test(windows_end_with_the_room),
                                        cmocka_unit_test(windows_begin_at_the_emission)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

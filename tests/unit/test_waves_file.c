@@ -70,7 +70,7 @@ static void test_none(void **state)
     }
 }
 
-/* Without waveforms there is the title; windows without points are counted. */
+/* Without waveforms there is the title; windows without points are counted, and so is one sample that was lost. */
 static void test_without(void **state)
 {
     (void)state;
@@ -79,9 +79,12 @@ static void test_without(void **state)
     rig_begin();
     rig_wave_descriptor(0, 1, 4);
     rig_anchor(&a);
-    rig_waves(0, 0, &d, &w, 1);
+    struct rig_digitiser full = d;
+    full.n_lost = 1;
+    rig_waves(0, 0, &full, &w, 1);
     struct bytes b = record("a.waves.csv");
     assert_string_equal((const char *)b.data, TITLE);
+    assert_non_null(strstr(rig_notes, "1 samples of waveforms that found no room in the head"));
     assert_non_null(strstr(rig_notes, "1 waveforms left out whose points were lost"));
     assert_null(strstr(rig_notes, "the head sends none"));
     free(b.data);

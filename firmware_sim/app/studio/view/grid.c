@@ -95,6 +95,5 @@ int viewed_end_grid(struct viewed_stream *s, struct sh_err *err)
     if (rc == SH_OK && faces.n_faces > 0) rc = add_mesh(s, &faces, (const double(*)[3])xyz_m, err);
     scan_faces_free(&faces);
     free(xyz_m);
-    s->grid.n = 0;
     return rc;
 }

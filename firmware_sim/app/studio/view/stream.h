@@ -21,7 +21,7 @@ struct viewed_stream {
     struct recording_counts counts;
 };
 
-/* Makes the mesh of the present grid, as drivers/record/mesh.c does; the grid is empty afterwards. */
+/* Makes the mesh of the present grid, as drivers/record/mesh.c does. The caller begins another grid, or is done. */
 int viewed_end_grid(struct viewed_stream *stream, struct sh_err *err);
 
 #endif
