@@ -20,7 +20,7 @@ int mesh_grid_check(const struct track *t, struct sh_err *err)
         return sh_fail(
             err, SH_EFORMAT,
             "%s: a mesh needs rows and columns, but this head fires %s; allowed are .ply (without --mesh and "
-            "--sparse) .las .e57 .shs",
+            "--sparse) .las .e57 .poses.csv .waves.csv .shs .pcapng",
             t->path, kind == SCANHEAD_EMIT_BEAMS ? "beams in turn" : "along a list");
     const int is_flat = kind == SCANHEAD_EMIT_PLANAR || (kind == SCANHEAD_EMIT_LINE && !(t->info.pan_deg_s > 0)) ||
                         (kind == SCANHEAD_EMIT_SPHERE && t->emitter.rings <= 1);

@@ -112,14 +112,14 @@ static void test_heads_without_rows(void **state)
         expect_refusal("a.ptx", &none,
                        i == 0
                            ? "a PTX grid has rows and columns, but this head fires beams in turn; allowed are .ply "
-                             ".las .e57 .shs"
+                             ".las .e57 .poses.csv .waves.csv .shs .pcapng"
                            : "a PTX grid has rows and columns, but this head fires along a list; allowed are .ply .las "
-                             ".e57 .shs");
+                             ".e57 .poses.csv .waves.csv .shs .pcapng");
         expect_refusal("a.ply", &mesh,
                        i == 0 ? "a mesh needs rows and columns, but this head fires beams in turn; allowed are .ply "
-                                "(without --mesh and --sparse) .las .e57 .shs"
+                                "(without --mesh and --sparse) .las .e57 .poses.csv .waves.csv .shs .pcapng"
                               : "a mesh needs rows and columns, but this head fires along a list; allowed are .ply "
-                                "(without --mesh and --sparse) .las .e57 .shs");
+                                "(without --mesh and --sparse) .las .e57 .poses.csv .waves.csv .shs .pcapng");
     }
 }
 

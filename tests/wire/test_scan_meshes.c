@@ -165,7 +165,7 @@ static void each_station_by_itself(void **state)
     for (size_t i = 0; i < sizeof name / sizeof name[0]; i++)
         assert_int_equal(access(wire_path(wire, name[i]), F_OK), 0);
     char *text = wire_read(wire_path(wire, "a-2.mtl"), NULL);
-    assert_non_null(strstr(text, "newmtl station 2\n"));
+    assert_non_null(strstr(text, "newmtl station_2\n"));
     assert_non_null(strstr(text, "map_Kd a-2.png\n"));
     free(text);
 }
