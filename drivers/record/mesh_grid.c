@@ -28,7 +28,7 @@ int mesh_grid_check(const struct track *t, struct sh_err *err)
         return sh_fail(
             err, SH_EFORMAT,
             "%s: a mesh needs a surface, but this head scans a single line: it neither pans nor moves, and has one "
-            "ring; allowed are .ply (without --mesh and --sparse) .las .ptx .e57 .shs",
+            "ring; allowed are .ply (without --mesh and --sparse) .las .ptx .e57 .poses.csv .waves.csv .shs .pcapng",
             t->path);
     if (t->info.moving && t->info.geo && t->info.crs != NATIVE_CRS_LOCAL)
         return sh_fail(
