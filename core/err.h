@@ -33,9 +33,9 @@ struct sh_err {
  * sh_keep_line. */
 int sh_fail(struct sh_err *err, int code, const char *fmt, ...) __attribute__((format(printf, 3, 4)));
 
-/* Replaces control characters by question marks, and each byte that is part of no character in UTF-8. Names from
- * files, and paths, may have any bytes, such as line ends and terminal commands, and a format such as %.40s may cut
- * them within a character. */
+/* Replaces control characters, and each byte that is part of no character in UTF-8, by question marks. Names from
+ * files, and paths, may have any bytes, such as line ends and terminal commands. A format such as %.40s may cut them
+ * within a character. */
 void sh_keep_line(char *text);
 
 /* Receives the reports of long work. Each member may be NULL. warn and progress are called from the

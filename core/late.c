@@ -16,8 +16,8 @@ static const struct {
     [LATE_websockets] = {SONAME_websockets, "a web link needs libwebsockets"},
 };
 
-/* Whether a library that is there found no memory. The system does not always give that reason: "failed to map" may
- * have others. A library of more than LARGE bytes is none of these. */
+/* Whether a library that is there found no memory. Where the system says only "failed to map", LARGE bytes are
+ * mapped as a trial: none of these libraries is larger. */
 static int has_no_memory(const char *why)
 {
     const size_t LARGE = 64 << 20;

@@ -7,8 +7,8 @@
  *
  * makes `struct proj_lib`, whose members are these calls, and `int proj_lib_load(struct proj_lib *lib, struct sh_err
  * *err)`: SH_EINPUT where the library is not on this machine, or lacks a call; SH_ENOMEM. A call is
- * lib.proj_create(...), with the types of the library's own header. Any thread; the library stays until the process ends. The Makefile takes the
- * library's file name (SONAME_proj) from the installed one. */
+ * lib.proj_create(...), with the types of the library's own header. Any thread; the library stays until the process
+ * ends. The Makefile takes the library's file name (SONAME_proj) from the installed one. */
 #ifndef CORE_LATE_H
 #define CORE_LATE_H
 

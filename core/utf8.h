@@ -5,8 +5,8 @@
 
 #include <stddef.h>
 
-/* Length of the character in UTF-8 that begins at p, within n bytes; 0: none does (Unicode 15, table 3-7). Reading
- * stops at the first byte that does not fit. So with n = 4 the function never reads beyond a NUL. */
+/* Returns the length of the character in UTF-8 that begins at p, within n bytes; 0: none does (Unicode 15, table 3-7).
+ * Reading stops at the first byte that does not fit. So with n = 4 the function never reads beyond a NUL. */
 static inline int utf8_len(const char *p, size_t n)
 {
     const unsigned char c = n > 0 ? (unsigned char)p[0] : 0xff;
@@ -26,8 +26,8 @@ static inline int utf8_len(const char *p, size_t n)
     return (int)len;
 }
 
-/* The largest number of bytes up to n after which the text can be cut: not within a character. The text has more than n
- * bytes; a NUL counts. A character has up to three bytes after its first one, so that other bytes are cut at n. */
+/* Returns the largest number of bytes, up to n, after which the text can be cut without dividing a character. The text
+ * has more than n bytes, with its NUL. Where four bytes in a row there begin no character, it is cut at n. */
 static inline size_t utf8_cut(const char *text, size_t n)
 {
     for (size_t k = 0; k < 4 && k <= n; k++)

@@ -174,7 +174,7 @@ static void lose_low_echo(struct caster *c, uint32_t i, double limit_m)
 }
 
 /* No head measures a range of 0 or less, or one that rounds to 0 in the counts of polar. Noise and range errors of the
- * instrument may make one of a near hit. Such an echo is lost. */
+ * instrument may move a near hit there. Such an echo is lost. */
 static void lose_low(struct caster *c, const struct chunk *k)
 {
     const double limit_m = k->s->layout == LINE_GEO ? 0.0 : 0.5 * k->s->range_scale_m;

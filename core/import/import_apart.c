@@ -194,7 +194,7 @@ void import_watch(struct import_apart *const a[], size_t n)
 enum { LARGE_LIMIT_MIB = 64 << 10 };
 
 /* Returns the address space that a limit of the user (`ulimit -v`) leaves to the process, in MiB. 0: there is no such
- * limit, or it is above that of import_child.c. A program that reads has the user's limit alone. */
+ * limit, or import_child.c sets a lower one. A reader that is a program has the user's limit alone. */
 static uint64_t user_limit_mib(const struct import_apart *a)
 {
     struct rlimit limit;
@@ -205,8 +205,8 @@ static uint64_t user_limit_mib(const struct import_apart *a)
     return most >> 20 > 0 ? most >> 20 : 1;
 }
 
-/* how: the way in which it ended. The file may be a good one. Few readers need more addresses than LARGE_LIMIT_MIB: where
- * is_sure is false, the file may be the cause then. */
+/* how: the way in which it ended. The file may be a good one. Few readers need more addresses than LARGE_LIMIT_MIB.
+ * Above that limit the file may be the cause, unless is_sure. */
 static int fail_by_addresses(const struct import_apart *a, const char *how, bool is_sure, struct sh_err *err)
 {
     const uint64_t limit_mib = user_limit_mib(a);

@@ -11,7 +11,7 @@
 
 struct import_open {
     struct aiFileIO io; /* for Assimp; UserData is this struct */
-    const char *path;   /* the file that has another text: */
+    const char *path;   /* the file that has `instead` for Assimp */
     struct text_span instead;
     char refused[400]; /* the first file that is there and can't be opened, and why; empty: none */
 };

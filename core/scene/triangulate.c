@@ -22,7 +22,7 @@ void triangulate_free(struct triangulate *t)
 
 /* Below this share of the areas that it adds up, a normal may be rounding alone, whose direction means nothing. Files
  * often have three decimals: corners are off by up to 0.5 mm in each axis, 0.9 mm in all. At sides of 0.3 m that is
- * 0.003 of a side, and the corners of both edges count: so up to 0.01. Measured in bow-ties of that size: 0.0029. */
+ * 0.003 of a side, and the corners of both edges count: so up to 0.01. Bow-ties of that size had 0.0029. */
 #define DOUBTFUL_SHARE 1e-2
 /* Below this share the polygon has no inner side: parts of it turn left, and as much turns right. */
 #define NO_AREA_SHARE 1e-12

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* Polygons -> triangles by ear clipping, in double.
  *
- * The polygon is projected along the largest axis of its Newell normal, or, where that is 0, of its largest triangle's.
- * Points that lie on an edge keep their
- * place (no triangle skips them, so neighbours still meet), and holes may be joined by a keyhole edge.
+ * The polygon is projected along the largest axis of its Newell normal, or, where that is nearly 0, of the normal of
+ * its largest triangle. Points that lie on an edge keep their place (no triangle skips them, so neighbours still meet),
+ * and holes may be joined by a keyhole edge.
  * The result is always n - 2 triangles. The triangles of a polygon that crosses itself overlap; `simple` is false
  * where this was noticed. Cost: n for convex polygons, n times the number of reflex corners otherwise. */
 #ifndef CORE_SCENE_TRIANGULATE_H

@@ -100,8 +100,8 @@ static int is_listed(const struct listing *l, const char *part, size_t len)
     return !l->is_whole || (l->n > 0 && bsearch(&key, l->name, l->n, sizeof(char *), compare_names) != NULL);
 }
 
-/* Whether a name can be that of a file in another case: a folder has its first part, or its last one. scene_find_file
- * reads folders for each name, which would take many minutes beside thousands of images. */
+/* Whether a name can be that of a file in another case: one of the two folders lists the name's first or last part.
+ * scene_find_file reads folders for each name, which would take many minutes beside thousands of images. */
 static int may_be_there(struct search *s, const char *name)
 {
     const char *const folder[] = {s->here, s->folder};

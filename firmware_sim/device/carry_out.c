@@ -97,8 +97,8 @@ static const char *why_dead(const struct device *device, uint64_t released)
     return device_is_dead(device, released) ? "the head has no power" : NULL;
 }
 
-/* Keeps what a command does beside changes, on a copy of the device, until power goes: to the error queue, and to
- * control, which it may give back. */
+/* Takes over what a command that changes no setting has done to a copy of the device: to the error queue, and to
+ * control, which it may have given back. Both hold until power goes. */
 static void keep_beside_changes(struct device *device, const struct command_device *copy, uint32_t session,
                                 const struct command_result *result)
 {

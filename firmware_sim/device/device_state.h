@@ -68,7 +68,7 @@ struct device_journal {
     struct journal_entry *replay;
     size_t n_replay, at; /* next entry to carry out */
     int ends;            /* the replayed one has an end */
-    int has_poses;       /* and poses of a live platform */
+    int has_poses;       /* the replayed one has poses of a live platform */
     uint64_t end_tick;   /* where the run at hand ended, once it is over */
     size_t n_refused;    /* commands of the replayed one; the first of them, and its reply: */
     const struct journal_entry *refused;

@@ -34,7 +34,7 @@ int64_t gnss_time_ns(const struct gnss *gnss, uint64_t index);
 /* The head's pose at a time, and a little before and after, from which speed and course follow. */
 #define GNSS_STEP_NS 5000000
 struct gnss_track {
-    struct pose before, at, after; /* GNSS_STEP_NS apart; where there is none before or after, it is that of the time */
+    struct pose before, at, after; /* GNSS_STEP_NS apart; before or after equals `at` where there is no such pose */
     int64_t span_ns;               /* from before to after; 0: there is neither, and no speed is known */
 };
 

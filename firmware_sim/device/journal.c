@@ -18,7 +18,7 @@
 
 static const char title[] = "# scanhead journal 1\n";
 static const char end_line[] = "END";    /* no command has this name */
-static const char pose_line[] = "POSE "; /* as has this one */
+static const char pose_line[] = "POSE "; /* nor this one */
 static const char lost_line[] = "LOST ";
 
 enum { QUEUE_BYTES = 1 << 20, LINE_ROOM = COMMAND_MAX_LINE + 64, TITLE_LEN = sizeof title - 2 };

@@ -53,8 +53,8 @@ static int is_early(const struct device *device, int64_t t_ns)
     return device->site->cfg->loop.pace != PACE_STEP && t_ns > now_ns + DEVICE_POSE_AHEAD_S * INT64_C(1000000000);
 }
 
-/* Whether one more pose leaves those that are still needed by pulses that are not claimed yet. A pose that is so far
- * ahead that it can come later leaves those that the receiver's fixes may need, too. */
+/* Whether one more pose has room: it may replace none that unclaimed pulses still need. A pose over PAST_NS ahead can
+ * come later, so it may replace none that the receiver's fixes need, either. */
 static int has_room(const struct device *device, int64_t t_ns)
 {
     const struct device_live *live = &device->live;
@@ -97,7 +97,7 @@ static int take_pose(struct device *device, int64_t t_ns, const double v[6], str
     return SH_OK;
 }
 
-/* A journal with an END has all poses up to its END, also those after its last line: none. */
+/* A journal with an END has all poses up to its END: after its last line of a pose none came. */
 int device_replays_poses(const struct device *device)
 {
     const struct device_journal *journal = &device->journal;
@@ -165,7 +165,7 @@ static uint32_t before_poses(const struct device *device, struct pose *out)
     return 0;
 }
 
-/* Returns the last of the poses from `first` on that is at t_ns or before. The first one is. */
+/* Returns the last of the poses from `first` on that is at t_ns or before. `first` itself is. */
 static uint64_t find_sample(const struct device_live *live, uint64_t first, int64_t t_ns)
 {
     uint64_t low = first, high = live->n;

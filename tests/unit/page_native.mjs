@@ -315,7 +315,7 @@ test('another sequence: its points have no place before its own descriptor and a
   const repeated = Object.assign(Buffer.from(d.bytes), {3: REPEAT}); // the descriptor alone says the same scan
   const again = readAll([...front, renumbered({bytes: repeated}, 7), renumbered(p, 8, 1000n)]);
   equal(again.decoder.stats.unplaced_shots, 3, 'after a repeated descriptor without its anchor');
-  // A descriptor for this reader alone has named the scan of the sequence that follows: its pulses and start are other ones.
+  // A descriptor for this reader alone has named the scan of the next sequence: its pulses and start are other ones.
   const told = signed(Object.assign(Buffer.from(d.bytes), {3: REPEAT | LOCAL}));
   const start = renumbered(samples[at(6)], 7);
   start.writeUInt32LE(2, 28);

@@ -53,7 +53,7 @@ int recorder_open(const struct recorder_ops *ops, const char *path, const struct
     return rc;
 }
 
-/* The place of a file in the list. */
+/* Returns the place of a file in the list. */
 static int of(const struct recorder *rec)
 {
     return (int)((const struct record_file *)(const void *)rec - files.file);

@@ -47,7 +47,7 @@ double triangle_area(const struct scene *s, uint32_t i);
 
 double total_area(const struct scene *s);
 
-/* Signed tetrahedra with the origin: above 0 where the faces look away from it. */
+/* Adds signed tetrahedra with the origin: they are above 0 where the faces look away from it. */
 double total_volume(const struct scene *s);
 
 #endif

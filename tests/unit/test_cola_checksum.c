@@ -100,8 +100,8 @@ static void values_and_nothing_else(void **state)
     }
 }
 
-/* A telegram of CoLa-A by the manual, whose words up to the channel are as long as a channel's name: the serial number
- * and both times. Only the digits of the three values change. */
+/* In this telegram of CoLa-A, the serial number and both times are as long as a channel's name, and stand before the
+ * channel. Only the digits of the three values change. */
 static void words_are_no_channels(void **state)
 {
     (void)state;

@@ -136,7 +136,7 @@ static void a_scan_of_its_own_may_be_over_when_it_comes(void **state)
 }
 
 /* The mirror takes 3 s to its speed, and the session is behind the head, where the scan is over by then. Two turns take
- * 80 ms. Only after that a scan that has not come is one that somebody has stopped. */
+ * 80 ms. If no scan has come by then, somebody has stopped it, and the head is started again. */
 static void a_slow_mirror_is_started_once(void **state)
 {
     (void)state;

@@ -207,8 +207,8 @@ static void kinds_need_what_they_change(void **state)
     }
 }
 
-/* Of each key the value that changes nothing, and the nearest ones that change something. The state of a port that
- * loses its master changes whatever its clock gains, so 0 ppm is no such value there. */
+/* For each key one value changes nothing, and the nearest ones change something. The state of a port that loses its
+ * master changes whatever its clock gains, so 0 ppm is no such value there. */
 static void a_fault_has_an_effect(void **state)
 {
     (void)state;

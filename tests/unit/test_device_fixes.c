@@ -66,8 +66,8 @@ static void a_fix_at_the_first_pose_has_its_speed(void **state)
     }
 }
 
-/* A platform in lock-step has a pose each 10 us, of which those kept are of 0.66 s. None is ahead, so none is refused,
- * though a receiver's fixes could use older ones. */
+/* A platform in lock-step has a pose each 10 us. Those that are kept span 0.66 s, though a receiver's fixes could use
+ * older ones. None is refused, since none is ahead. */
 static void quick_poses_are_not_refused(void **state)
 {
     (void)state;

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What is lost: ticks that the head could not compute in time, whose events are reported again; changes before power
- * goes, which are refused. */
+/* Events of ticks that the head could not compute in time are reported again. Changes before power goes are refused. */
 #include "tests/unit/device_rig.h"
 
 static void a_lost_tick_says_its_events_again(void **state)

@@ -225,7 +225,7 @@ static void no_pose_is_lost_before_its_time(void **state)
     ride_with(sets, sizeof sets / sizeof sets[0], 1000);
 }
 
-/* A single pose that is far ahead. Until its time the head is at its station, which is flagged, counted and announced.
+/* A single pose is far ahead. Until its time the head is at its station, which is flagged, counted and announced.
  * A pose before it is refused, and the reason names its time. */
 static void no_pose_is_used_before_its_time(void **state)
 {
@@ -251,8 +251,8 @@ static void no_pose_is_used_before_its_time(void **state)
 
 enum { RIDE_TICKS = 500, RIDE_POSES = 4 }; /* poses of the head in a tick */
 
-/* A ride of RIDE_TICKS ticks with commands and, unless a journal has them, poses: some are given a moment ahead, some
- * are refused. Keeps the head's poses of each tick. */
+/* Makes a ride of RIDE_TICKS ticks with commands and, unless a journal has them, poses: some are given a moment ahead,
+ * some are refused. Keeps the head's poses of each tick. */
 static void make_ride(const struct device_options *options, int gives, struct pose_knot knot[][RIDE_POSES])
 {
     static const char *const sets[] = {"platform.kind=live", "platform.reach_m=5", "head.frames=0", "loop.pace=step"};
@@ -281,8 +281,8 @@ static void a_replay_has_the_poses(void **state)
     assert_memory_equal(again, once, sizeof once);
 }
 
-/* While a journal with poses is replayed, no others are taken. That is up to its END; where it has none, poses are taken
- * after its last line. A journal without poses, as earlier heads wrote it, leaves them to the peer. */
+/* While a journal with poses is replayed, no others are taken. That lasts until its END; where it has none, until its
+ * last line. A journal without poses, as earlier heads wrote it, leaves them to the peer. */
 static void a_replay_takes_no_other_poses(void **state)
 {
     (void)state;

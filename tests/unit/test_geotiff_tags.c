@@ -242,7 +242,7 @@ static void numbers_of_metadata(void **state)
     }
 }
 
-/* A no-data value that is not a number is ignored, and kept for a warning. Its text has up to 62 characters and a NUL. */
+/* A no-data value that is not a number is ignored, and kept for a warning. Its text has up to 62 characters. */
 static void no_data_values(void **state)
 {
     (void)state;

@@ -119,7 +119,7 @@ static void test_new_scan_forgets(void **state)
     for (int i = 0; i < 3; i++)
         assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);
     assert_int_equal(scanhead_points(sh, &f, 0, &p, 1), 1);
-    /* The same scan, which began at 500 ns: nothing new. Then one of a head that has started again. */
+    /* The first event is of the same scan, which began at 500 ns. The second is of a head that has started again. */
     for (int is_other = 0; is_other < 2; is_other++) {
         put_event(head, NATIVE_EV_SCAN_START, 2, 500u + (uint64_t)is_other, 0, 0);
         expect_frame(sh, SCANHEAD_EVENT, &f);

@@ -80,7 +80,7 @@ static void factors_of_a_map_conversion(void **state)
     }
 }
 
-/* One for the context of the model and one for that of plans: they have to say the same, in whatever words. */
+/* The context of the model has one, and that of plans another one. They have to say the same, in whatever words. */
 static void several_map_conversions(void **state)
 {
     (void)state;

@@ -124,7 +124,7 @@ static void bodies_are_chosen(void **state)
         {{"#13,'Body','GeometricSet',(#7002)", CURVE, CURVE}, "111", ""},
         {{"#13,'Body','GeometricSet',(#7003)", CURVE, CURVE}, "111", "b"},
         {{"#13,'Body','GeometricSet',(#7026)", CURVE, CURVE}, "111", ""},
-        /* Names of offices' own, and no names: these stay. */
+        /* Representations with a name that IFC does not define, or without one, stay. */
         {{"#13,'Shell','SweptSolid',(#1060)", "#13,'Body','SweptSolid',(#1060)", "#13,'Clearance','Brep',(#1060)"},
          "110",
          "b"},
@@ -154,7 +154,7 @@ static void bodies_are_chosen(void **state)
         {{"#13,'FootPrint','GeometricSet',(#7035)", "#13,'Plan','Curve2D',(#7030,#7032,#7033,#7034)", CURVE},
          "111",
          ""},
-        /* Levels of detail. */
+        /* Of several levels of detail the best one stays. */
         {{"#7011,'Body','Brep',(#1060)", "#7010,'Body','Brep',(#1060)", "#7010,'Axis','Curve3D',(#7000)"}, "011", "bl"},
         {{"#7012,'Body','Brep',(#1060)", "#7013,'Body','Brep',(#1060)", "#7011,'Body','Brep',(#1060)"}, "010", "bl"},
         {{"#7013,'Body','Brep',(#1060)", "#7010,'Body','Brep',(#1060)", CURVE}, "011", "bl"},

@@ -188,7 +188,7 @@ static void limit_of_the_user_is_named(void **state)
     judged_under_limit(&a, "good.ifc: memory access out of bounds");
     sh_fail(&a.said, SH_EINPUT, "good.ifc: nothing in it");
     judged_under_limit(&a, "good.ifc: nothing in it");
-    /* A fork has a limit of our own as well: that counts while it is the lower one, as 8 GiB are. */
+    /* A fork has a limit of our own as well, here 8 GiB. The lower limit counts. */
     a = program;
     a.task.argv = NULL;
     sh_fail(&a.said, SH_EINPUT, "std::bad_alloc");

@@ -227,7 +227,7 @@ static void test_cut_inside(void **state)
         assert_true(file.was_whole);
         repair_free(&file);
     }
-    for (int length_is_wrong = 1; length_is_wrong >= 0; length_is_wrong--) { /* the first round repairs the second's */
+    for (int length_is_wrong = 1; length_is_wrong >= 0; length_is_wrong--) { /* round 2: it is repaired */
         struct repaired file;
         if (length_is_wrong) {
             repair_write_file(repair_path, whole.data, whole.len);

@@ -28,7 +28,7 @@ char *dlerror(void)
     return (char *)(uintptr_t)fails_with;
 }
 
-/* The words are those of glibc. "failed to map" is of memory only where there is none, as below a limit. */
+/* The words are those of glibc. "failed to map" is a lack of memory only where there is none, as under a limit. */
 static void a_lack_of_memory_is_its_own_error(void **state)
 {
     (void)state;

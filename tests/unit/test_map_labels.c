@@ -353,7 +353,7 @@ static void test_svg(void **state)
     map_free(map);
 }
 
-/* The name and the height of a station, as far as it has them. */
+/* A station is titled by its name and height, as far as it has them. */
 static void test_titles(void **state)
 {
     (void)state;

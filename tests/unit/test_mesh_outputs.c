@@ -266,7 +266,7 @@ static void fbx_axes_and_time(void **state)
 }
 
 /* glTF has 12 bytes for a face, a position and a normal, 8 for texture coordinates and 16 for a colour, which an image
- * replaces. FBX has three normals of 24 bytes for a face, or three colours of 32. Only a refusal reads no vertex. */
+ * replaces. FBX has three normals of 24 bytes for a face, or three colours of 32. A refusal needs no vertex. */
 static void files_of_four_gib_are_refused(void **state)
 {
     (void)state;

@@ -88,7 +88,7 @@ static void each_part_has_a_ray_on_both_sides(void **state)
 
 /* An edge that leads away, from 9 m to 11 m ahead and 1 m aside, has ten parts of 0.2 m. Both sides see something else
  * at 10 m, so parts beyond it are hidden. A part that is y ahead is at hypot(1, y): the one at 9.9 m is 9.95 m away,
- * and the next one 10.15 m. A neighbour of a part that counts does, too. */
+ * and the next one 10.15 m. A neighbour of a part that counts also counts. */
 static void parts_are_hidden_by_their_own_range(void **state)
 {
     (void)state;

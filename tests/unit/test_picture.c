@@ -278,7 +278,7 @@ static void texts_have_their_strokes(void **state)
     picture_free(&p);
 }
 
-/* Pixel at a place of a glyph's grid, where picture_text drew the glyph with its left end at (10, 44). */
+/* Returns the pixel at a place of a glyph's grid, where picture_text drew the glyph with its left end at (10, 44). */
 static double ink_of_glyph(const struct picture *p, double x, double y)
 {
     return ink(p, (uint32_t)floor(10 + x), (uint32_t)floor(44 - y));

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The poses of a moving head as they go out with its pulses: on a trajectory and before, between and after the poses of
- * a live platform. And where moving meshes are in the points beside them. */
+ * a live platform. Points beside them show where moving meshes are. */
 #include <math.h>
 
 #include "core/pose.h"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the header of a recorded mesh says of its colours, and what the recorder says of points spread over it. */
+/* The header of a recorded mesh says what its colours show, and the recorder says where no point is spread over it. */
 #include "tests/unit/recorder_rig.h"
 
 /* Two lines of two shots, whose hits are the corners of a square metre at 10 m. */

@@ -114,7 +114,7 @@ static void a_picture_that_is_none(void **state)
              config_path);
     if (strncmp(warned, want, strlen(want)) != 0) fail_msg("%s", warned);
     assert_non_null(strstr(warned, "/wall.png: "));
-    /* The signal does without the picture, too. */
+    /* The signal can do without the picture as well: it uses the colour, or signal.reflectance. */
     clear_warned();
     site_free(site);
     site = NULL;

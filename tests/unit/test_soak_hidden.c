@@ -266,7 +266,7 @@ static void a_refused_frame_is_missing(void **state)
     assert_int_equal(gaps, 1);
     assert_int_equal(soak->link[0].refused_now, 0);
     soak_rig_end(soak);
-    soak = soak_rig_make(); /* two were refused, and one is not there: the other does not stand for a later one */
+    soak = soak_rig_make(); /* two were refused, and one is not there: the other refusal is forgotten */
     see(soak, FIRST, 0, 0.0);
     soak->link[0].refused_now = 2;
     see(soak, FIRST + 2, 0, 0.0);

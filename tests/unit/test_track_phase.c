@@ -33,7 +33,7 @@ static struct schedule_spec spec_of(int i)
                                   .line_stop_udeg = 130 * HZ};
 }
 
-/* The row of pulse k: so many pulses of these rates lie between the line's angle 0 and the pulse. */
+/* Returns the row of pulse k: so many pulses of these rates lie between the line's angle 0 and the pulse. */
 static uint64_t row_of(const struct schedule_segment *seg, uint64_t k)
 {
     struct schedule_line line;

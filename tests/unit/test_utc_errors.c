@@ -77,7 +77,7 @@ static void room_for_leap_seconds(void **state)
         assert_int_equal(utc_table_add(&table, at), 0);
     }
     assert_int_equal(utc_table_add(&table, table.leap[table.n - 1].posix_s + 86400), 0);
-    /* Before 1972 there are none. */
+    /* Before 1972 no leap second can be added. */
     table = *utc_table_builtin();
     const struct utc_table same = table;
     assert_int_equal(utc_table_add(&table, 0), 0);

@@ -324,7 +324,7 @@ static void the_observer_is_behind_until_the_end(void **state)
     }
 }
 
-/* The end of scan 1 was lost, and scan 2 has no points. Where scan 2 ends, scan 1 is over, too, and not the last one. */
+/* The end of scan 1 was lost, and scan 2 has no points. Where scan 2 ends, scan 1 is over too, and not the last one. */
 static void an_earlier_scan_s_end_is_not_the_last(void **state)
 {
     (void)state;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A page saves the points so far while frames were lost, go missing, or are still to come. Run from the top of the source
- * tree. */
+/* A page saves the points so far while frames were lost, go missing, or are still to come. Run from the top of the
+ * source tree. */
 #include <dlfcn.h>
 #include <stdlib.h>
 

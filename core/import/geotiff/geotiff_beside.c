@@ -26,13 +26,13 @@ static bool is_one_grid(const struct geotiff *a, const struct geotiff *b)
     return true;
 }
 
-/* Whether a row of cells, or a column, of one raster goes on with the other's: `from` cells further on. */
+/* Whether one of two rasters begins where the other one ends. The other raster begins `from` cells further on. */
 static bool goes_on(double from, uint32_t n, uint32_t n_other)
 {
     return fabs(from - n) <= NEAR || fabs(from + n_other) <= NEAR;
 }
 
-/* Whether two rasters have cells at the same height of the side that they share. */
+/* Whether two rasters lie beside each other in at least part of the rows, or of the columns. */
 static bool overlaps(double from, uint32_t n, uint32_t n_other)
 {
     return from < n - NEAR && from + n_other > NEAR;

@@ -274,7 +274,7 @@ static bool is_masked(const json_t *material)
     return mode != NULL && strcmp(mode, "MASK") == 0;
 }
 
-/* alphaCutoff, by default 0.5. */
+/* Returns alphaCutoff, by default 0.5. */
 static double cutoff_of(const json_t *material)
 {
     const json_t *cutoff = json_object_get(material, "alphaCutoff");

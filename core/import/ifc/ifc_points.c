@@ -38,7 +38,7 @@ struct points {
     struct ifc_index *x;
     struct ifc_edits *edits;
     struct coordinates last[KEPT_LISTS]; /* face sets with a PnIndex often share a few lists */
-    size_t next;                         /* of these, it gives way to another list */
+    size_t next;                         /* modulo KEPT_LISTS: that of `last` which the next list replaces */
     uint64_t next_id;
     struct sh_err *err;
 };

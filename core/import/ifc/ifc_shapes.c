@@ -74,7 +74,7 @@ static int rank_of(struct text_span name, bool *is_known)
 }
 
 /* A representation without a name has that of a representation which it maps, where that is a body. Of several, the
- * best rank counts, since the items stay together or not at all. An item of its own has no name. */
+ * best rank counts, since the items stay together or not at all. Items that map nothing count as without a name. */
 static struct text_span name_of(struct ifc_items *items, const struct text_span arg[REP_ARGS])
 {
     struct text_span inner[REP_ARGS], best = arg[REP_NAME];

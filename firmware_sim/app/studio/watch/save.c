@@ -25,7 +25,7 @@
 enum { AS_LEN = 9, FOLDER_LEN = 400, PATH_LEN = FOLDER_LEN + 32 };
 enum save_state { SAVE_IDLE, SAVE_WORKING, SAVE_DONE, SAVE_FAILED };
 
-/* While nothing more comes for so long, the end of a scan is waited for. */
+/* A scan's end is waited for until nothing more has come for PATIENCE_NS. */
 static const int64_t PATIENCE_NS = 10000000000, WAIT_NS = 5000000;
 
 struct save {
@@ -129,8 +129,8 @@ static void renumber(struct renumber *r, uint8_t *frames, size_t len)
     }
 }
 
-/* The past may have dropped pieces at `from` since the frames before were read. A gap of one number stands for their
- * frames, which nobody has counted. All points that went are then older than this piece, and the file has some of
+/* The past may have dropped pieces from `from` on since the frames before were read. A gap of one number stands for
+ * their frames, which nobody has counted. All points that went are then older than this piece, and the file has some of
  * them. Points that go later may be in the file. */
 static void note_missing(struct save *s, const struct web_body *piece, uint64_t from, struct renumber *numbers)
 {
