@@ -234,8 +234,8 @@ static void a_first_configuration(void **state)
     does(&app_check, "new.yaml", 0);
     assert_int_equal(link("room.obj", "a\001b.obj"), 0);
     does(&app_init, "a\001b.obj -o second.yaml", 2);
-    assert_string_equal(on_err, "scanhead: a?b.obj: its path has control characters, so no key can name it; allowed is "
-                                "a path without: rename it\n");
+    assert_string_equal(on_err, "scanhead: a?b.obj: its path has control characters, so no key can name it: rename "
+                                "it\n");
     unlink("a\001b.obj");
     does(&app_init, "room.obj -o new.yaml", 2);
     assert_string_equal(on_err, "scanhead: new.yaml already exists; give another name with -o, or --force to replace "

@@ -211,7 +211,7 @@ static void meshopt_is_unpacked(void **state)
     try_packed("ATTRIBUTES", ",\"filter\":\"OCTAHEDRAL\"", 0,
                "meshopt does not allow ATTRIBUTES with 4 elements of 12 bytes");
     try_strides("ATTRIBUTES", "", 0, 16,
-                "bufferViews[2].byteStride is 16, and that of its packed elements 12; allowed is one for both");
+                "bufferViews[2].byteStride is 16, but its packed elements have 12 bytes; both must be equal");
 }
 
 /* ---- placement of textures */

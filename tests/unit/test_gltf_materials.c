@@ -128,7 +128,7 @@ static void opacities_are_multiplied(void **state)
                {1, ",\"alphaCutoff\":1", {1, 1, 1, 1}, true, 1, 2, ""},
                {0.8, "", {0.5f, 0.5f, 0.25f, 0}, false, -1, 0, "2 triangles left out: they have less opacity"},
                {1, "", {0, 0, 0, 1}, false, -1, 1, "1 triangles left out: they have less opacity"},
-               {1, "", {0, 0, 0, 1}, false, -1, 1, "1 triangles of masked materials have opacities of their corners"},
+               {1, "", {0, 0, 0, 1}, false, -1, 1, "1 triangles of masked materials have opacities at their corners"},
                {1, "", {0.75f, 0.75f, 0.75f, 0.75f}, false, -1, 2, ""},
                /* 0.9f is 0.89999998, and 0.7f times 0.9 a little below 0.63: equal numbers as a file has them */
                {1, ",\"alphaCutoff\":0.9", {0.9f, 0.9f, 0.9f, 0.9f}, false, -1, 2, ""},

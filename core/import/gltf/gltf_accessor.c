@@ -70,7 +70,7 @@ static int open_packed(struct gltf *g, const json_t *more, const char *at, uint6
     if (rc == SH_OK) rc = gltf_whole(g, more, "byteStride", at, &p.stride);
     if (rc == SH_OK) rc = gltf_whole(g, more, "count", at, &p.count);
     if (rc == SH_OK && stride != 0 && stride != p.stride)
-        return gltf_fail(g, "%s.byteStride is %llu, and that of its packed elements %llu; allowed is one for both", at,
+        return gltf_fail(g, "%s.byteStride is %llu, but its packed elements have %llu bytes; both must be equal", at,
                          (unsigned long long)stride, (unsigned long long)p.stride);
     return rc == SH_OK ? gltf_meshopt(g->b, &p, at, &out->own, &out->bytes, g->err) : rc;
 }

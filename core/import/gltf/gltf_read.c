@@ -55,8 +55,8 @@ static void say_counts(const struct gltf *g)
                    (unsigned long long)g->n_holes);
     if (g->n_faded > 0)
         build_warn(g->b,
-                   "%llu triangles of masked materials have opacities of their corners (COLOR_0): they are read "
-                   "without holes by these",
+                   "%llu triangles of masked materials have opacities at their corners (COLOR_0); these are not used, "
+                   "and make no holes",
                    (unsigned long long)g->n_faded);
     if (g->n_images > 0)
         build_warn(g->b, "%u primitives have a texture of %s, which is not supported: their surfaces have no texture",

@@ -94,7 +94,7 @@ int ifc_say_findings(struct scene_build *b, const struct ifc_product *product, s
 void ifc_say_levels(struct scene_build *b, const struct ifc_product *product, size_t n_products)
 {
     struct lines l = {b, product, n_products, LEVELS,
-                      .text = "with bodies for several views or scales: that for the most detailed one is used"};
+                      .text = "with bodies for several views or scales, of which the most detailed one is used"};
     count_group(&l);
     say_group(&l);
 }

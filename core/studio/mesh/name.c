@@ -44,8 +44,7 @@ int mesh_check_name(const char *path, struct sh_err *err)
                        "%s: a line of .obj names its other files; allowed are names without control characters", path);
     if (!ends_in(name, ".gltf")) return SH_OK; /* .glb holds all */
     if (!is_utf8(name))
-        return sh_fail(err, SH_EINPUT, "%s: .gltf is UTF-8, and so are the names of its files; allowed is such a name",
-                       path);
+        return sh_fail(err, SH_EINPUT, "%s: this name is not UTF-8, as .gltf has it; allowed is a name in UTF-8", path);
     if (c == NULL) return SH_OK;
     return sh_fail(err, SH_EINPUT,
                    "%s: .gltf refers to its other files by URIs, where %c has a special meaning; allowed are names "

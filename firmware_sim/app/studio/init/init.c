@@ -108,10 +108,8 @@ static int check_path(const struct init_run *run, struct sh_err *err)
                        run->name);
     for (const char *p = run->path; *p != '\0'; p++)
         if ((unsigned char)*p < 0x20 || *p == 0x7f)
-            return sh_fail(
-                err, SH_EINPUT,
-                "%s: its path has control characters, so no key can name it; allowed is a path without: rename it",
-                run->name);
+            return sh_fail(err, SH_EINPUT, "%s: its path has control characters, so no key can name it: rename it",
+                           run->name);
     return SH_OK;
 }
 
