@@ -3,6 +3,7 @@
 #ifndef CORE_UTF8_H
 #define CORE_UTF8_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 /* Returns the length of the character in UTF-8 that begins at p, within n bytes; 0: none does (Unicode 15, table 3-7).
@@ -24,6 +25,14 @@ static inline int utf8_len(const char *p, size_t n)
         if (next < (i == 1 ? low : 0x80) || next > (i == 1 ? high : 0xbf)) return 0;
     }
     return (int)len;
+}
+
+static inline bool utf8_is_valid(const char *text)
+{
+    int n = 1;
+    for (; *text != '\0' && n > 0; text += n)
+        n = utf8_len(text, 4);
+    return n > 0;
 }
 
 /* Returns the largest number of bytes, up to n, after which the text can be cut without dividing a character. The text

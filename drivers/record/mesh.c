@@ -274,7 +274,8 @@ static void mesh_report(const struct mesh_recorder *m)
     recorder_report(r, m->n_later, "echoes left out; a mesh holds the first of a shot");
     recorder_report(r, m->n_lost, "points left out whose pose was lost");
     recorder_report(r, m->n_split, "additional meshes begun within a scan, since its line or row numbers went back");
-    recorder_report(r, ply_count_unnamed(&r->track), PLY_UNNAMED);
+    if (mesh_takes_points(r->file.path)) /* the other formats have no header */
+        recorder_report(r, ply_count_unnamed(&r->track), PLY_UNNAMED);
     if (m->every > 1) {
         snprintf(what, sizeof what, "lines and rows share one texel, since a texture has up to %d texels a side",
                  MESH_TEXTURE_SIDE);

@@ -320,7 +320,8 @@ static void take_event(struct track *t, const struct scanhead_frame *frame)
 int track_is_late_start(const struct track *track, const struct scanhead_frame *start)
 {
     const int64_t begin_ns = track->state.last_begin_ns;
-    return track->n_scans != 0 && (int64_t)start->event_value[1] == begin_ns && start->t_ns - begin_ns > track->t0_ns;
+    return track->n_scans != 0 && (int64_t)start->event_value[1] == begin_ns &&
+           native_since_ns(start->t_ns, begin_ns) > track->t0_ns;
 }
 
 int track_frame(struct track *t, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err)

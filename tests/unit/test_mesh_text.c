@@ -80,6 +80,10 @@ static void names_that_no_mesh_can_refer_to(void **state)
     expect_name("a\xc3.gltf", "a?.gltf: this name is not UTF-8, as .gltf has it; allowed is a name in UTF-8");
     expect_name("a?b.gltf", "a?b.gltf: .gltf refers to its other files by URIs, where ? has a special meaning; allowed "
                             "are names without % # ? : \\");
+    expect_name("a\nb.OBJ", "a?b.OBJ: a line of .obj names its other files; allowed are names without control "
+                            "characters");
+    expect_name("a#b.GLTF", "a#b.GLTF: .gltf refers to its other files by URIs, where # has a special meaning; allowed "
+                            "are names without % # ? : \\");
     expect_name("a%\xc3\n.glb", NULL);
 }
 

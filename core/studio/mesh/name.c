@@ -5,18 +5,8 @@
 #include <string.h>
 
 #include "core/studio/mesh/inside.h"
+#include "core/text.h"
 #include "core/utf8.h"
-
-static int is_utf8(const char *text)
-{
-    for (size_t left = strlen(text); left > 0;) {
-        const int n = utf8_len(text, left);
-        if (n <= 0) return 0;
-        text += n;
-        left -= (size_t)n;
-    }
-    return 1;
-}
 
 static int is_control(unsigned char c)
 {
@@ -30,20 +20,14 @@ static int has_control(const char *text)
     return 0;
 }
 
-static int ends_in(const char *name, const char *ending)
-{
-    const size_t n = strlen(name), end = strlen(ending);
-    return n >= end && strcmp(name + n - end, ending) == 0;
-}
-
 int mesh_check_name(const char *path, struct sh_err *err)
 {
     const char *name = basename(path), *c = strpbrk(name, "%#?:\\");
-    if (ends_in(name, ".obj") && has_control(name))
+    if (text_has_ending(name, ".obj") && has_control(name))
         return sh_fail(err, SH_EINPUT,
                        "%s: a line of .obj names its other files; allowed are names without control characters", path);
-    if (!ends_in(name, ".gltf")) return SH_OK; /* .glb holds all */
-    if (!is_utf8(name))
+    if (!text_has_ending(name, ".gltf")) return SH_OK; /* .glb holds all */
+    if (!utf8_is_valid(name))
         return sh_fail(err, SH_EINPUT, "%s: this name is not UTF-8, as .gltf has it; allowed is a name in UTF-8", path);
     if (c == NULL) return SH_OK;
     return sh_fail(err, SH_EINPUT,

@@ -13,7 +13,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <yaml.h>
+
+#include "core/utf8.h"
 
 static int is_digit(char c)
 {
@@ -225,16 +226,6 @@ static int store_word(const struct place *at, void *dst, const char *text)
     return refuse(at, text, "not known");
 }
 
-/* Returns whether a value of the command line is UTF-8; libyaml checks those of files. */
-static int is_utf8(const char *text)
-{
-    yaml_document_t doc;
-    if (!yaml_document_initialize(&doc, NULL, NULL, NULL, 1, 1)) return 0;
-    int node = yaml_document_add_scalar(&doc, NULL, (const yaml_char_t *)text, -1, YAML_ANY_SCALAR_STYLE);
-    yaml_document_delete(&doc);
-    return node != 0;
-}
-
 static int store_text(const struct place *at, char *dst, const char *text, const char *base_dir)
 {
     if (text[0] == '\0') return refuse(at, text, "empty");
@@ -246,7 +237,8 @@ static int store_text(const struct place *at, char *dst, const char *text, const
     }
     const char *before = "";
     if (at->key->type == CFG_PATH && text[0] != '/') before = base_dir;
-    if (at->key->type == CFG_TEXT && !is_utf8(text)) return refuse(at, text, "not UTF-8");
+    if (at->key->type == CFG_TEXT && !utf8_is_valid(text)) /* on the command line; libyaml checks files */
+        return refuse(at, text, "not UTF-8");
     if (strlen(before) + strlen(text) >= at->key->size)
         return refuse(at, text, before[0] != '\0' ? "too long with the folder of its file" : "too long");
     snprintf(dst, at->key->size, "%s%s", before, text);

@@ -66,16 +66,6 @@ static int find_place(const struct init_run *run, const struct scene *scene, str
 
 /* ---- the file */
 
-static bool is_utf8(const char *text)
-{
-    while (*text != '\0') {
-        const int n = utf8_len(text, 4);
-        if (n == 0) return false;
-        text += n;
-    }
-    return true;
-}
-
 /* Finds the mesh's path from the configuration's folder; where the two share only the root, its absolute path. */
 static int find_path(const struct init_run *run, char path[CONFIG_PATH_LEN], struct sh_err *err)
 {
@@ -103,7 +93,7 @@ static int find_path(const struct init_run *run, char path[CONFIG_PATH_LEN], str
  * control characters. */
 static int check_path(const struct init_run *run, struct sh_err *err)
 {
-    if (!is_utf8(run->path))
+    if (!utf8_is_valid(run->path))
         return sh_fail(err, SH_EINPUT, "%s: its path is not UTF-8, so YAML can't name it; allowed is UTF-8: rename it",
                        run->name);
     for (const char *p = run->path; *p != '\0'; p++)

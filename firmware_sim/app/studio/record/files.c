@@ -9,8 +9,9 @@
 #include <string.h>
 
 #include "core/grow.h"
-#include "core/studio/mesh.h"
 #include "core/newfile.h"
+#include "core/studio/mesh.h"
+#include "drivers/protocol/native.h"
 #include "firmware_sim/app/app.h"
 
 int record_files_add(struct record_files *files, const char *path, struct sh_err *err)
@@ -415,7 +416,7 @@ int record_files_frame(struct record_files *files, struct scanhead *sh, const st
             rc = recorder_frame(files->file[i].rec, sh, frame, err);
     if (rc == SH_OK && frame->type == SCANHEAD_POINTS) {
         files->has_points = 1;
-        files->begin_ns = (int64_t)((uint64_t)frame->t_ns - (uint64_t)frame->scan_t0_ns); /* a broken stream may wrap */
+        files->begin_ns = native_since_ns(frame->t_ns, frame->scan_t0_ns);
         files->last_ns = frame->t_ns;
     }
     return rc;
