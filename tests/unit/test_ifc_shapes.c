@@ -154,7 +154,7 @@ static void bodies_are_chosen(void **state)
         {{"#13,'FootPrint','GeometricSet',(#7035)", "#13,'Plan','Curve2D',(#7030,#7032,#7033,#7034)", CURVE},
          "111",
          ""},
-        /* Of several levels of detail the best one stays. */
+        /* The best of several levels of detail stays. */
         {{"#7011,'Body','Brep',(#1060)", "#7010,'Body','Brep',(#1060)", "#7010,'Axis','Curve3D',(#7000)"}, "011", "bl"},
         {{"#7012,'Body','Brep',(#1060)", "#7013,'Body','Brep',(#1060)", "#7011,'Body','Brep',(#1060)"}, "010", "bl"},
         {{"#7013,'Body','Brep',(#1060)", "#7010,'Body','Brep',(#1060)", CURVE}, "011", "bl"},

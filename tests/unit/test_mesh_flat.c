@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* A mesh's note on triangles without area. */
-#include "tests/unit/recorder_rig.h"
+#include "tests/unit/grid_rig.h"
 
 /* Of the first line's four shots two are at one place, and so are two of the second line. One of the three cells has
  * an edge of no length on either side: its two triangles have no area. */
@@ -8,25 +8,10 @@ static void flat_triangles_are_noted(void **state)
 {
     (void)state;
     const struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 1);
-    const struct native_descriptor d = {.idn = "Maker,Model,SN1,1.0",
-                                        .profile = "model",
-                                        .scan = 1,
-                                        .layout = NATIVE_GEO,
-                                        .prr_uhz = 1000000000,
-                                        .lines_uhz = 1000000,
-                                        .pan_udeg_s = 36000000,
-                                        .pan_stop_udeg = 360000000,
-                                        .sweep_udeg = 360000000,
-                                        .line_stop_udeg = 36000000,
-                                        .range_max_m = 100,
-                                        .frames = 1,
-                                        .mirror_counts_per_turn = 3600,
-                                        .pan_counts_per_turn = 3600,
-                                        .range_scale_m = 1e-3};
-    static uint8_t out[1024];
+    const struct native_descriptor d = grid_rig_descriptor(1);
     struct rig_point p[2][4];
     rig_begin();
-    rig_put(out, native_encode_descriptor(out, sizeof out, &d, 0, 0));
+    grid_rig_put_descriptor(&d);
     rig_anchor(&a);
     for (uint32_t line = 0; line < 2; line++) {
         for (int k = 0; k < 4; k++)

@@ -1,34 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /* The header of a recorded mesh says what its colours show, and the recorder says where no point is spread over it. */
-#include "tests/unit/recorder_rig.h"
+#include "tests/unit/grid_rig.h"
 
 /* Two lines of two shots, whose hits are the corners of a square metre at 10 m. */
 static void put_square(void)
 {
-    static uint8_t out[1024];
-    const struct native_descriptor d = {.idn = "Maker,Model,SN1,1.0",
-                                        .profile = "model",
-                                        .scan = 1,
-                                        .layout = NATIVE_GEO,
-                                        .prr_uhz = 1000000000,
-                                        .lines_uhz = 1000000,
-                                        .pan_udeg_s = 36000000,
-                                        .pan_stop_udeg = 360000000,
-                                        .sweep_udeg = 360000000,
-                                        .line_stop_udeg = 36000000,
-                                        .range_max_m = 100,
-                                        .frames = 1};
-    struct native_anchor a = rig_anchor_of(NATIVE_CRS_LOCAL, 0, 3);
-    memcpy(a.anchor, a.station_m, sizeof a.anchor);
-    memcpy(a.axes, (const double[9]){1, 0, 0, 0, 1, 0, 0, 0, 1}, sizeof a.axes);
     rig_begin();
-    rig_put(out, native_encode_descriptor(out, sizeof out, &d, 0, 0));
-    rig_anchor(&a);
-    for (int line = 0; line < 2; line++) {
-        const struct rig_point p[2] = {{1000 * line, 10000, 0, -500, 0, 1, 1},
-                                       {1000 * line, 10000, 1000, -500, 0, 1, 1}};
-        rig_points((uint32_t)line, 1000 * (uint64_t)line, 1000 * (uint64_t)line + 20, p, 2);
-    }
+    grid_rig_begin_scan(1, 3);
+    for (int line = 0; line < 2; line++)
+        grid_rig_put_line((uint32_t)line, 20,
+                          (const struct rig_point[]){grid_rig_hit(line, 10, 0, 0), grid_rig_hit(line, 10, 1, 0)}, 2);
 }
 
 static char *record(struct recorder_options options)

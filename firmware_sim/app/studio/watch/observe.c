@@ -202,7 +202,7 @@ static void observe_take_event(struct watch *w, const struct scanhead_frame *fra
         note_lost(w, frame->event_value[2]);
         break;
     case SCANHEAD_EV_SCAN_START:
-        /* That of the scan at hand can come after its first points. The head at hand numbers its scans on. */
+        /* The event of the scan at hand can come after its first points. The head at hand numbers its scans on. */
         if ((uint32_t)a != w->at.scan) end_scan(w);
         w->begun = (uint32_t)a;
         break;
