@@ -10,8 +10,7 @@
 
 #include "core/bytes.h"
 #include "core/vecmath.h"
-
-__extension__ typedef unsigned __int128 u128;
+#include "core/wide.h"
 
 enum { EIGHT_DIGITS = 100000000, MOST_DECIMALS = 22, MANTISSA_BITS = 52, EXPONENTS = 2047 };
 

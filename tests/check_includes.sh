@@ -82,7 +82,7 @@ rules='
         if (to == "core/late.h") return a == "drivers/link"
         if (to == "core/newfile.h") return a == "drivers/record" || a == "drivers/link"
         if (a == "drivers/host" || a == "drivers/record")
-            return b == "drivers/protocol" || to ~ /^core\/(vec3|mat3|quat|vecmath|grow)\.h$/ || \
+            return b == "drivers/protocol" || to ~ /^core\/(vec3|mat3|quat|vecmath|wide|grow)\.h$/ || \
                 (a == "drivers/record" && to == "drivers/host/scanhead.h")
         if (a == "drivers/protocol") return to == "core/line.h"
         if (a == "drivers/link") return b == "drivers/usb" || b == "drivers/socket" || to == "drivers/protocol/http_head.h"

@@ -10,21 +10,10 @@
 #include <stddef.h>
 
 #include "core/schedule.h"
-
-__extension__ typedef unsigned __int128 u128;
+#include "core/wide.h"
 
 #define TURN_UDEG    360000000LL
 #define NS_TIMES_UHZ 1000000000000000ull /* ns per second x micro-hertz per hertz */
-
-static inline u128 gcd(u128 a, u128 b)
-{
-    while (b != 0) {
-        u128 r = a % b;
-        a = b;
-        b = r;
-    }
-    return a;
-}
 
 static inline uint64_t ceil_div(u128 a, u128 b)
 {

@@ -3,9 +3,8 @@
 
 #include <math.h>
 
+#include "core/wide.h"
 #include "drivers/protocol/native.h"
-
-__extension__ typedef unsigned __int128 u128;
 
 int track_start_gps(const struct track *track, double *gps_s)
 {

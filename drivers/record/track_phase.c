@@ -1,21 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 #include "drivers/record/track_phase.h"
 
-__extension__ typedef unsigned __int128 u128;
-
-static uint64_t common_divisor(uint64_t a, uint64_t b)
-{
-    while (b != 0) {
-        const uint64_t rest = a % b;
-        a = b;
-        b = rest;
-    }
-    return a;
-}
+#include "core/wide.h"
 
 static void set_rates(struct track_phase *phase, uint64_t prr_uhz, uint64_t lines_uhz)
 {
-    const uint64_t common = common_divisor(prr_uhz, lines_uhz);
+    const uint64_t common = (uint64_t)gcd(prr_uhz, lines_uhz);
     const int known = prr_uhz > 0 && lines_uhz > 0;
     phase->num = known ? lines_uhz / common : 0;
     phase->den = known ? prr_uhz / common : 0;
