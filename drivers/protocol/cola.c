@@ -135,17 +135,15 @@ static int is_as_set(const struct cola *self)
     return self->scan.whole != NULL && had->steps == set->steps && had->lines_uhz == set->lines_uhz;
 }
 
-enum cola_error cola_read_scan(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_read_scan(struct cola *self)
 {
-    const enum cola_error error = cola_args_end(args);
-    if (error != COLA_OK) return error;
     if (is_as_set(self)) {
-        cola_put_scan(self, out);
+        cola_put_scan(self, &self->out);
         self->telegrams++;
         return COLA_OK;
     }
     if (self->n_waiting == COLA_MOST_WAITING || cola_start_scan(self) != 0) return COLA_CONDITION;
-    self->waiting_form[self->n_waiting++] = (uint8_t)out->form;
+    self->waiting_form[self->n_waiting++] = (uint8_t)self->out.form;
     return COLA_LATER;
 }
 
