@@ -38,7 +38,7 @@ struct cola_settings {
 };
 
 struct cola {
-    struct protocol_spec spec; /* its `stored` is valid in create only */
+    struct protocol_spec spec; /* its `stored` is valid in set_up (cola.c) only */
     const struct cola_model *model;
     struct cola_settings set;
     char stored[PROTOCOL_STORED]; /* what mEEwriteall has kept */
