@@ -12,10 +12,10 @@
 #include "drivers/socket/socket.h"
 
 struct fd_link {
+    struct link_base base;
     int fd;
-    int reported_opened, reported_closed;
+    int reported_closed;
     int ended;
-    char name[64];
 };
 
 static int fd_open(const struct link_spec *spec, void **link, struct sh_err *err)
@@ -25,26 +25,20 @@ static int fd_open(const struct link_spec *spec, void **link, struct sh_err *err
     if (getsockopt(spec->fd, SOL_SOCKET, SO_TYPE, &type, &len) != 0)
         return sh_fail(err, SH_EINPUT, "link fd:%d: not an open socket: %s", spec->fd, strerror(errno));
     if (type != SOCK_STREAM) return sh_fail(err, SH_EINPUT, "link fd:%d: not a stream socket", spec->fd);
-    struct fd_link *self = calloc(1, sizeof *self);
-    if (self == NULL) return sh_fail(err, SH_ENOMEM, "link fd:%d: no memory", spec->fd);
+    struct fd_link *self = link_new(sizeof *self, err, "fd:%d", spec->fd);
+    if (self == NULL) return SH_ENOMEM;
     self->fd = spec->fd;
-    snprintf(self->name, sizeof self->name, "fd:%d", spec->fd);
-    if (spec->path[0] != '\0') snprintf(self->name, sizeof self->name, "%.60s", spec->path);
+    if (spec->path[0] != '\0') snprintf(self->base.name, sizeof self->base.name, "%.60s", spec->path);
     *link = self;
     return SH_OK;
-}
-
-static void fd_endpoint(const void *link, char *buf, size_t len)
-{
-    const struct fd_link *self = link;
-    snprintf(buf, len, "%s", self->name);
 }
 
 static int fd_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *event, int max)
 {
     struct fd_link *self = link;
     struct link_events events = {event, 0, max};
-    if (!self->reported_opened) self->reported_opened = link_events_push(&events, LINK_OPENED, 0, self->name);
+    if (!self->base.reported_opened)
+        self->base.reported_opened = link_events_push(&events, LINK_OPENED, 0, self->base.name);
     struct pollfd fds[2] = {{.fd = wake_fd, .events = POLLIN}, {.fd = self->reported_closed ? -1 : self->fd}};
     fds[1].events = (short)(POLLIN | ((want_write & 1u) != 0 ? POLLOUT : 0));
     int rc = link_wait(fds, 2, events.n > 0 || (self->ended && !self->reported_closed) ? 0 : timeout_ms);
@@ -54,7 +48,7 @@ static int fd_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms,
     const enum socket_state state = socket_state(self->fd, fds[1].revents);
     if (self->ended || state != SOCKET_OPEN) {
         self->ended = 1;
-        self->reported_closed = link_events_push(&events, LINK_CLOSED, 0, self->name);
+        self->reported_closed = link_events_push(&events, LINK_CLOSED, 0, self->base.name);
         return events.n;
     }
     if ((fds[1].revents & POLLIN) != 0) link_events_push(&events, LINK_READABLE, 0, NULL);
@@ -100,7 +94,7 @@ static void fd_close(void *link)
 const struct link_ops link_fd = {
     .name = "fd",
     .open = fd_open,
-    .endpoint = fd_endpoint,
+    .endpoint = link_base_endpoint,
     .poll = fd_poll,
     .read = fd_read,
     .write = fd_write,

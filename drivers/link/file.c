@@ -6,7 +6,6 @@
  * full) ends the session; its LINK_CLOSED has the reason in `peer`. */
 #include <errno.h>
 #include <fcntl.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -16,10 +15,10 @@
 #include "drivers/link/link_poll.h"
 
 struct file_link {
+    struct link_base base; /* its name is the path after "file:" */
     int fd;
-    int reported_opened, reported_closed;
+    int reported_closed;
     int failed; /* errno of the write that failed, 0: none */
-    char path[256];
 };
 
 static int file_open(const struct link_spec *spec, void **link, struct sh_err *err)
@@ -30,9 +29,9 @@ static int file_open(const struct link_spec *spec, void **link, struct sh_err *e
     if (spec->path[0] == '\0') return sh_fail(err, SH_EINPUT, "link file: a path is needed");
     int rc = newfile_open(spec->path, &fd, &why);
     if (rc != SH_OK) return sh_fail(err, rc, "link file:%s", why.text);
-    struct file_link *file = calloc(1, sizeof *file);
+    struct file_link *file = link_new(sizeof *file, err, "file:%s", spec->path);
     if (file == NULL)
-        rc = sh_fail(err, SH_ENOMEM, "link file:%s: no memory", spec->path);
+        rc = SH_ENOMEM;
     else if (fstat(fd, &st) != 0 || fcntl(fd, F_SETFL, O_APPEND | (S_ISCHR(st.st_mode) ? O_NONBLOCK : 0)) != 0)
         rc = sh_fail(err, SH_EIO, "link file:%s: %s", spec->path, strerror(errno));
     else if (!S_ISREG(st.st_mode) && !S_ISCHR(st.st_mode))
@@ -44,22 +43,16 @@ static int file_open(const struct link_spec *spec, void **link, struct sh_err *e
         return rc;
     }
     file->fd = fd;
-    snprintf(file->path, sizeof file->path, "%s", spec->path);
     *link = file;
     return SH_OK;
-}
-
-static void file_endpoint(const void *link, char *buf, size_t len)
-{
-    const struct file_link *file = link;
-    snprintf(buf, len, "file:%s", file->path);
 }
 
 static int file_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *event, int max)
 {
     struct file_link *file = link;
     struct link_events events = {event, 0, max};
-    if (!file->reported_opened) file->reported_opened = link_events_push(&events, LINK_OPENED, 0, file->path);
+    const char *const path = file->base.name + sizeof "file:" - 1;
+    if (!file->base.reported_opened) file->base.reported_opened = link_events_push(&events, LINK_OPENED, 0, path);
     if (file->failed != 0 && !file->reported_closed)
         file->reported_closed = link_events_push(&events, LINK_CLOSED, 0, strerror(file->failed));
     /* A device may be full, such as a serial port with flow control; a regular file never is. */
@@ -102,7 +95,7 @@ const struct link_ops link_file = {
     .name = "file",
     .stalls = 1,
     .open = file_open,
-    .endpoint = file_endpoint,
+    .endpoint = link_base_endpoint,
     .poll = file_poll,
     .read = file_read,
     .write = file_write,

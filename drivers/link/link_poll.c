@@ -2,8 +2,31 @@
 #include "drivers/link/link_poll.h"
 
 #include <errno.h>
+#include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 #include <unistd.h>
+
+void *link_new(size_t size, struct sh_err *err, const char *name, ...)
+{
+    struct link_base *base = calloc(1, size);
+    char text[sizeof base->name];
+    va_list args;
+    va_start(args, name);
+    vsnprintf(text, sizeof text, name, args);
+    va_end(args);
+    if (base == NULL)
+        sh_fail(err, SH_ENOMEM, "link %s: no memory", text);
+    else
+        memcpy(base->name, text, sizeof text);
+    return base;
+}
+
+void link_base_endpoint(const void *link, char *buf, size_t len)
+{
+    snprintf(buf, len, "%s", ((const struct link_base *)link)->name);
+}
 
 int link_events_push(struct link_events *events, enum link_event_kind kind, int session, const char *peer)
 {

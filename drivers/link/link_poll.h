@@ -1,11 +1,22 @@
 /* SPDX-License-Identifier: MIT */
-/* Private helpers for the poll functions of links: they add events, wait in poll(2), and report the owner's wake-up. */
+/* Private helpers of links: most have the same beginning. Their poll functions add events, wait in poll(2), and report
+ * the owner's wake-up. */
 #ifndef DRIVERS_LINK_LINK_POLL_H
 #define DRIVERS_LINK_LINK_POLL_H
 
 #include <poll.h>
 
 #include "drivers/link/link.h"
+
+/* The first member of the struct of a link whose endpoint is named once, by open. */
+struct link_base {
+    char name[280];
+    int reported_opened;
+};
+/* Makes a link of that size, all 0, with its name as printf writes it. NULL: there is no memory. */
+__attribute__((format(printf, 3, 4))) void *link_new(size_t size, struct sh_err *err, const char *name, ...);
+/* link_ops.endpoint: the name. */
+void link_base_endpoint(const void *link, char *buf, size_t len);
 
 /* Events of one poll call. push answers 0 when there is no room. The caller then leaves its state as it is,
  * so that the event comes with the next call. */

@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: MIT */
 #include "drivers/link/memory.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "drivers/link/link_poll.h"
 
 struct memory_link {
+    struct link_base base;
     struct link_memory *shared;
     size_t written; /* bytes of the last write, which the client may still need; 0: none */
-    int reported_opened, reported_closed;
+    int reported_closed;
 };
 
 /* ---- the client's end */
@@ -48,17 +48,11 @@ void memory_leave(struct link_memory *memory)
 
 static int memory_open(const struct link_spec *spec, void **link, struct sh_err *err)
 {
-    struct memory_link *self = calloc(1, sizeof *self);
-    if (self == NULL) return sh_fail(err, SH_ENOMEM, "link memory: no memory");
+    struct memory_link *self = link_new(sizeof *self, err, "memory");
+    if (self == NULL) return SH_ENOMEM;
     self->shared = spec->memory;
     *link = self;
     return SH_OK;
-}
-
-static void memory_endpoint(const void *link, char *buf, size_t len)
-{
-    (void)link;
-    snprintf(buf, len, "memory");
 }
 
 static int memory_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *event, int max)
@@ -66,7 +60,7 @@ static int memory_poll(void *link, int wake_fd, uint32_t want_write, int timeout
     struct memory_link *self = link;
     struct link_memory *m = self->shared;
     struct link_events events = {event, 0, max};
-    if (!self->reported_opened) self->reported_opened = link_events_push(&events, LINK_OPENED, 0, "memory");
+    if (!self->base.reported_opened) self->base.reported_opened = link_events_push(&events, LINK_OPENED, 0, "memory");
     if (m->left && !self->reported_closed) self->reported_closed = link_events_push(&events, LINK_CLOSED, 0, "memory");
     if (!m->left && m->sent_len != 0) link_events_push(&events, LINK_READABLE, 0, NULL);
     return link_poll_sink(wake_fd, !m->left && (want_write & 1u) != 0 && m->n_taken == m->n_pieces, timeout_ms,
@@ -130,7 +124,7 @@ static void memory_close(void *link)
 const struct link_ops link_memory = {
     .name = "memory",
     .open = memory_open,
-    .endpoint = memory_endpoint,
+    .endpoint = link_base_endpoint,
     .poll = memory_poll,
     .read = memory_read,
     .write = memory_write,

@@ -31,6 +31,7 @@ struct tcp_session {
 };
 
 struct tcp_link {
+    struct link_base base;
     struct link_listener listener;
     int is_silent; /* its cable is pulled */
     int n_sessions, brief;
@@ -40,23 +41,18 @@ struct tcp_link {
 
 static int tcp_open(const struct link_spec *spec, void **link, struct sh_err *err)
 {
-    struct tcp_link *tcp = calloc(1, sizeof *tcp);
-    if (tcp == NULL) return sh_fail(err, SH_ENOMEM, "link tcp: no memory");
+    struct tcp_link *tcp = link_new(sizeof *tcp, err, "tcp");
+    if (tcp == NULL) return SH_ENOMEM;
     const int rc = link_listen("link tcp", spec, &tcp->listener, err);
     if (rc != SH_OK) {
         free(tcp);
         return rc;
     }
+    snprintf(tcp->base.name, sizeof tcp->base.name, "tcp:%s", tcp->listener.at);
     tcp->n_sessions = spec->max_sessions;
     tcp->brief = spec->brief;
     *link = tcp;
     return SH_OK;
-}
-
-static void tcp_endpoint(const void *link, char *buf, size_t len)
-{
-    const struct tcp_link *tcp = link;
-    snprintf(buf, len, "tcp:%s", tcp->listener.at);
 }
 
 static int free_slot(const struct tcp_link *tcp)
@@ -333,7 +329,7 @@ const struct link_ops link_tcp = {
     .faults = LINK_FAULT_BIT(LINK_FAULT_DISCONNECT) | LINK_FAULT_BIT(LINK_FAULT_REFUSE) |
               LINK_FAULT_BIT(LINK_FAULT_UNPLUG) | LINK_FAULT_BIT(LINK_FAULT_CABLE),
     .open = tcp_open,
-    .endpoint = tcp_endpoint,
+    .endpoint = link_base_endpoint,
     .poll = tcp_poll,
     .read = tcp_read,
     .write = tcp_write,

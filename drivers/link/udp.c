@@ -36,13 +36,12 @@
 enum { SEND_BUFFER_BYTES = 1 << 20, DRAIN_READS = 4096 };
 
 struct udp_link {
+    struct link_base base;
     int fd;
-    int reported_opened;
     int unplugged;
     int is_silent; /* its cable is pulled */
     int closing;   /* LINK_CLOSED is to be reported */
     uint64_t refused;
-    char name[80];
     char notice[200]; /* to be reported; empty: none */
 };
 
@@ -302,8 +301,8 @@ static int udp_open(const struct link_spec *spec, void **link, struct sh_err *er
     int rc = find_receiver(spec, &to.at, &to.len, err);
     if (rc == SH_OK) rc = check_receiver(spec, (struct sockaddr *)&to.at, &to.net, &to.broadcast, err);
     if (rc != SH_OK) return rc;
-    struct udp_link *udp = calloc(1, sizeof *udp);
-    if (udp == NULL) return sh_fail(err, SH_ENOMEM, "link udp:%s:%d: no memory", host_of(spec), spec->port);
+    struct udp_link *udp = link_new(sizeof *udp, err, "udp:%s:%d", host_of(spec), spec->port);
+    if (udp == NULL) return SH_ENOMEM;
     udp->fd = socket(to.at.ss_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     if (udp->fd < 0 || connect_to(udp->fd, spec, &to, udp->notice) != 0) {
         const int why = errno;
@@ -321,24 +320,19 @@ static int udp_open(const struct link_spec *spec, void **link, struct sh_err *er
     }
     char at[72];
     socket_address_text((struct sockaddr *)&to.at, to.len, at, sizeof at);
-    snprintf(udp->name, sizeof udp->name, "udp:%s", at);
+    snprintf(udp->base.name, sizeof udp->base.name, "udp:%s", at);
     *link = udp;
     return SH_OK;
-}
-
-static void udp_endpoint(const void *link, char *buf, size_t len)
-{
-    const struct udp_link *udp = link;
-    snprintf(buf, len, "%s", udp->name);
 }
 
 static int udp_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *event, int max)
 {
     struct udp_link *udp = link;
     struct link_events events = {event, 0, max};
-    if (udp->closing && link_events_push(&events, LINK_CLOSED, 0, udp->name)) udp->reported_opened = udp->closing = 0;
-    if (!udp->reported_opened && !udp->unplugged)
-        udp->reported_opened = link_events_push(&events, LINK_OPENED, 0, udp->name);
+    if (udp->closing && link_events_push(&events, LINK_CLOSED, 0, udp->base.name))
+        udp->base.reported_opened = udp->closing = 0;
+    if (!udp->base.reported_opened && !udp->unplugged)
+        udp->base.reported_opened = link_events_push(&events, LINK_OPENED, 0, udp->base.name);
     if (udp->notice[0] != '\0' && link_events_push(&events, LINK_NOTICE, 0, udp->notice)) udp->notice[0] = '\0';
     struct pollfd fds[2] = {{.fd = wake_fd, .events = POLLIN},
                             {.fd = udp->unplugged || udp->is_silent ? -1 : udp->fd, .events = POLLIN}};
@@ -388,7 +382,7 @@ static int udp_fault(void *link, enum link_fault what, int session, uint32_t n, 
     (void)session, (void)n, (void)for_ms;
     if (what == LINK_FAULT_UNPLUG && !udp->unplugged) {
         udp->unplugged = 1;
-        udp->closing = udp->reported_opened;
+        udp->closing = udp->base.reported_opened;
         return SH_OK;
     }
     if (what == LINK_FAULT_CABLE && !udp->unplugged && !udp->is_silent) {
@@ -421,7 +415,7 @@ const struct link_ops link_udp = {
     .datagrams = 1,
     .faults = LINK_FAULT_BIT(LINK_FAULT_UNPLUG) | LINK_FAULT_BIT(LINK_FAULT_CABLE),
     .open = udp_open,
-    .endpoint = udp_endpoint,
+    .endpoint = link_base_endpoint,
     .poll = udp_poll,
     .read = udp_read,
     .write = udp_write,

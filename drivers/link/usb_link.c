@@ -84,7 +84,7 @@ static double usb_capacity(const void *link)
 {
     static const double rate[USB_N_RATES] = {19 * 64 * 1e3, 10 * 512 * 8e3, 400e6};
     const struct usb_link *self = link;
-    return rate[usb_device_identity(self->head.device)->highest];
+    return rate[usb_facts(self->head.device)->id.highest];
 }
 
 /* Once a session is over, only bytes from before its end are read. */
@@ -111,7 +111,7 @@ static int has_to_report(const struct usb_link *self, int i)
  * reported. */
 static int is_plugged_anew(const struct usb_link *self)
 {
-    return self->plugged != usb_device_attaches(self->head.device);
+    return self->plugged != usb_facts(self->head.device)->attaches;
 }
 
 static int usb_link_go_on(void *ctx)
@@ -196,7 +196,7 @@ static int usb_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
     scanhead_usb_update(&self->head);
     self->ops->flush(self->backend);
     if (is_plugged_anew(self) && link_events_push(&events, LINK_PLUGGED, 0, NULL))
-        self->plugged = usb_device_attaches(self->head.device);
+        self->plugged = usb_facts(self->head.device)->attaches;
     for (int i = 0; i < self->n; i++)
         usb_link_report(self, i, want_write, &events);
     report_news(self, &events);

@@ -17,7 +17,6 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "drivers/link/link_poll.h"
 #include "drivers/link/web_inside.h"
 
 struct websockets_lib web_lws;
@@ -63,13 +62,14 @@ static int web_open(const struct link_spec *spec, void **link, struct sh_err *er
 {
     int rc = websockets_lib_load(&web_lws, err);
     if (rc != SH_OK) return rc;
-    struct web_link *web = calloc(1, sizeof *web);
-    if (web == NULL) return sh_fail(err, SH_ENOMEM, "link web: no memory");
+    struct web_link *web = link_new(sizeof *web, err, "web");
+    if (web == NULL) return SH_ENOMEM;
     rc = link_listen("link web", spec, &web->listener, err);
     if (rc != SH_OK) {
         free(web);
         return rc;
     }
+    snprintf(web->base.name, sizeof web->base.name, "http://%s/", web->listener.at);
     snprintf(web->host, sizeof web->host, "%s", spec->address);
     web->port = atoi(strrchr(web->listener.at, ':') + 1);
     web->n_sessions = spec->max_sessions;
@@ -86,12 +86,6 @@ static int web_open(const struct link_spec *spec, void **link, struct sh_err *er
     }
     *link = web;
     return SH_OK;
-}
-
-static void web_endpoint(const void *link, char *buf, size_t len)
-{
-    const struct web_link *web = link;
-    snprintf(buf, len, "http://%s/", web->listener.at);
 }
 
 /* ---- sessions */
@@ -377,7 +371,7 @@ const struct link_ops link_web = {
     .faults = LINK_FAULT_BIT(LINK_FAULT_DISCONNECT) | LINK_FAULT_BIT(LINK_FAULT_REFUSE) |
               LINK_FAULT_BIT(LINK_FAULT_UNPLUG) | LINK_FAULT_BIT(LINK_FAULT_CABLE),
     .open = web_open,
-    .endpoint = web_endpoint,
+    .endpoint = link_base_endpoint,
     .poll = web_poll,
     .read = web_read,
     .write = web_write,

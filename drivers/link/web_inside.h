@@ -7,6 +7,7 @@
 
 #include "core/late.h"
 #include "drivers/link/link_listen.h"
+#include "drivers/link/link_poll.h"
 #include "drivers/link/web.h"
 #include "drivers/link/web_places.h"
 #include "drivers/protocol/http_head.h"
@@ -100,6 +101,7 @@ struct web_conn {
 };
 
 struct web_link {
+    struct link_base base;
     struct lws_context *context;
     struct lws_vhost *vhost;
     struct lws *listening, *wake; /* listening NULL: unplugged */

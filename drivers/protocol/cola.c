@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* SICK CoLa-A and CoLa-B (SOPAS): TiM5xx, TiM7xx, LMS1xx. COLA.md is the protocol's page. */
 #include <stdio.h>
-#include <stdlib.h>
 
 #include "drivers/protocol/cola.h"
 
@@ -27,20 +26,13 @@ uint32_t cola_time_us(const struct cola *self, int64_t t_ns)
     return (uint32_t)((uint64_t)(t_ns - self->spec.power_ns) / 1000U) - self->spec.near_wrap;
 }
 
-static int cola_create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
+static int set_up(void *protocol, struct sh_err *err)
 {
-    struct cola *self = calloc(1, sizeof *self);
-    if (self == NULL) return sh_fail(err, SH_ENOMEM, "protocol cola: no memory for %zu bytes", sizeof *self);
-    self->spec = *spec;
-    self->model = cola_model_find(spec->identity->model);
-    if (spec->stored != NULL) snprintf(self->stored, sizeof self->stored, "%s", spec->stored);
+    struct cola *self = protocol;
+    self->model = cola_model_find(self->spec.identity->model);
+    if (self->spec.stored != NULL) snprintf(self->stored, sizeof self->stored, "%s", self->spec.stored);
     planar_scan_init(&self->scan);
-    const int rc = cola_power_up(self, err);
-    if (rc != SH_OK)
-        free(self);
-    else
-        *protocol = self;
-    return rc;
+    return cola_power_up(self, err);
 }
 
 static void open_at(void *protocol, int64_t t_ns)
@@ -135,17 +127,15 @@ static int is_as_set(const struct cola *self)
     return self->scan.whole != NULL && had->steps == set->steps && had->lines_uhz == set->lines_uhz;
 }
 
-enum cola_error cola_read_scan(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_read_scan(struct cola *self)
 {
-    const enum cola_error error = cola_args_end(args);
-    if (error != COLA_OK) return error;
     if (is_as_set(self)) {
-        cola_put_scan(self, out);
+        cola_put_scan(self, &self->out);
         self->telegrams++;
         return COLA_OK;
     }
     if (self->n_waiting == COLA_MOST_WAITING || cola_start_scan(self) != 0) return COLA_CONDITION;
-    self->waiting_form[self->n_waiting++] = (uint8_t)out->form;
+    self->waiting_form[self->n_waiting++] = (uint8_t)self->out.form;
     return COLA_LATER;
 }
 
@@ -202,8 +192,8 @@ const struct protocol_ops protocol_cola = {
     .content = cola_content,
     .reseal = cola_reseal,
     .check_head = check_head,
-    .create = cola_create,
-    .destroy = free,
+    .size = sizeof(struct cola),
+    .begin = set_up,
     .open = open_at,
     .frame = take_frame,
     .gap = take_gap,

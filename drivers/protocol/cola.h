@@ -17,6 +17,7 @@ enum {
     COLA_MAX_UNIT = 4 * 5 * PLANAR_MAX_STEPS + 1000,
     COLA_MAX_NAME = 32,
     COLA_MOST_WAITING = 100,
+    COLA_MOST_ARGS = 12, /* of LMDscandatacfg */
 };
 
 /* Levels of access. */
@@ -37,7 +38,7 @@ struct cola_settings {
 };
 
 struct cola {
-    struct protocol_spec spec; /* its `stored` is valid in create only */
+    struct protocol_spec spec; /* its `stored` is valid in set_up (cola.c) only */
     const struct cola_model *model;
     struct cola_settings set;
     char stored[PROTOCOL_STORED]; /* what mEEwriteall has kept */
@@ -77,14 +78,18 @@ struct cola {
     uint8_t waiting_form[COLA_MOST_WAITING]; /* the form in which each is answered */
     uint16_t telegrams;                      /* counter of LMDscandata */
     struct cola_input input;
+    struct cola_args args; /* the values of the request at hand, and read into numbers */
+    uint32_t arg[COLA_MOST_ARGS];
+    struct cola_out out; /* the answer to it, in `unit` */
     struct planar_scan scan;
     struct cola_way way;
     struct cola_encoder encoder_now, encoder; /* of the turn at hand, and of the last whole one */
     uint8_t unit[COLA_MAX_UNIT];
 };
 
-/* Carries out a request: reads its values, and writes those of the answer. Returns COLA_OK, COLA_LATER or an error. */
-typedef enum cola_error cola_handler(struct cola *self, struct cola_args *args, struct cola_out *out);
+/* Carries out a request: takes its values from `arg`, and writes those of the answer to `out`. Returns COLA_OK,
+ * COLA_LATER or an error. */
+typedef enum cola_error cola_handler(struct cola *self);
 
 static inline int cola_is_measuring(const struct cola *self)
 {
@@ -171,6 +176,8 @@ uint32_t cola_field_number(const char *name);
 cola_handler cola_read_field, cola_write_field;
 cola_handler cola_read_inputs, cola_read_outputs, cola_read_field_results, cola_read_set_method, cola_write_set_method,
     cola_read_set, cola_write_set, cola_set_results_event, cola_set_outputs_event, cola_set_inputs_event;
+/* Whether the model has the variables of sets of fields. */
+int cola_has_sets(const struct cola *self);
 /* The event LIDoutputstate. */
 void cola_send_outputs(struct cola *self, enum cola_form form);
 /* The active outputs, a bit each. */
@@ -208,8 +215,6 @@ cola_handler cola_read_ident, cola_read_serial, cola_read_firmware, cola_read_lo
 
 /* cola_commands.c: one request, and its answer. */
 
-/* Reads the value of an event's request: u8 1 on, 0 off. */
-enum cola_error cola_read_switch(struct cola_args *args, int *on);
 void cola_carry_out(struct cola *self, const struct cola_request *request);
 /* Answers sFA with that error. */
 void cola_refuse(struct cola *self, enum cola_form form, enum cola_error error);

@@ -11,90 +11,81 @@ static const struct command {
     const char *name;
     char verb;     /* of s?N: R, W, M, E */
     uint8_t level; /* at least */
+    /* The request's values. 1, 2, 4: a number of so many bytes without a sign; h, i: one of 2 or 4 bytes with a sign;
+     * s: a switch, u8 0 or 1. Before them ?: not all models have the variable. NULL: carry_out reads them. */
+    const char *values;
     cola_handler *carry_out;
 } commands[] = {
-    {"0", 'R', COLA_RUN, cola_read_ident},
-    {"DeviceIdent", 'R', COLA_RUN, cola_read_ident},
-    {"SerialNumber", 'R', COLA_RUN, cola_read_serial},
-    {"FirmwareVersion", 'R', COLA_RUN, cola_read_firmware},
-    {"LocationName", 'R', COLA_RUN, cola_read_location},
-    {"LocationName", 'W', COLA_CLIENT, cola_write_location},
-    {"SCdevicestate", 'R', COLA_RUN, cola_read_state},
-    {"STlms", 'R', COLA_RUN, cola_read_lms_state},
-    {"LCMstate", 'R', COLA_RUN, cola_read_contamination},
-    {"ODoprh", 'R', COLA_RUN, cola_read_hours},
-    {"ODpwrc", 'R', COLA_RUN, cola_read_power_ons},
-    {"EIHstCola", 'R', COLA_RUN, cola_read_framing},
-    {"EIHstCola", 'W', COLA_CLIENT, cola_write_framing},
-    {"LMPoutputRange", 'R', COLA_RUN, cola_read_output_range},
-    {"LMPoutputRange", 'W', COLA_CLIENT, cola_write_output_range},
-    {"LMPscancfg", 'R', COLA_RUN, cola_read_scan_cfg},
-    {"LMDscandatacfg", 'R', COLA_RUN, cola_read_scan_data_cfg},
-    {"LMDscandatacfg", 'W', COLA_CLIENT, cola_write_scan_data_cfg},
-    {"LMDscandatascalefactor", 'R', COLA_RUN, cola_read_scale},
-    {"LMDscandatascalefactor", 'W', COLA_CLIENT, cola_write_scale},
-    {"FREchoFilter", 'R', COLA_RUN, cola_read_filter},
-    {"FREchoFilter", 'W', COLA_CLIENT, cola_write_filter},
-    {"LMDscandata", 'R', COLA_RUN, cola_read_scan},
-    {"LIDinputstate", 'R', COLA_RUN, cola_read_inputs},
-    {"LIDoutputstate", 'R', COLA_RUN, cola_read_outputs},
-    {"LFErec", 'R', COLA_RUN, cola_read_field_results},
-    {"FieldSetSelectionMethod", 'R', COLA_RUN, cola_read_set_method},
-    {"FieldSetSelectionMethod", 'W', COLA_CLIENT, cola_write_set_method},
-    {"ActiveFieldSet", 'R', COLA_RUN, cola_read_set},
-    {"ActiveFieldSet", 'W', COLA_CLIENT, cola_write_set},
-    {"TSCRole", 'R', COLA_RUN, cola_read_time_role},
-    {"TSCRole", 'W', COLA_CLIENT, cola_write_time_role},
-    {"TSCTCInterface", 'R', COLA_RUN, cola_read_time_interface},
-    {"TSCTCInterface", 'W', COLA_CLIENT, cola_write_time_interface},
-    {"TSCTCSrvAddr", 'R', COLA_RUN, cola_read_time_address},
-    {"TSCTCSrvAddr", 'W', COLA_CLIENT, cola_write_time_address},
-    {"TSCTCtimezone", 'R', COLA_RUN, cola_read_time_zone},
-    {"TSCTCtimezone", 'W', COLA_CLIENT, cola_write_time_zone},
-    {"TSCTCupdatetime", 'R', COLA_RUN, cola_read_time_update},
-    {"TSCTCupdatetime", 'W', COLA_CLIENT, cola_write_time_update},
-    {"TSCTCmaxoffset", 'R', COLA_RUN, cola_read_time_limit},
-    {"TSCTCdelay", 'R', COLA_RUN, cola_read_time_delay},
-    {"SetAccessMode", 'M', COLA_RUN, cola_log_in},
-    {"GetAccessMode", 'M', COLA_RUN, cola_get_level},
-    {"CheckPassword", 'M', COLA_RUN, cola_check_password},
-    {"Run", 'M', COLA_RUN, cola_log_out},
-    {"mLMPsetscancfg", 'M', COLA_CLIENT, cola_set_scan_cfg},
-    {"LMCstartmeas", 'M', COLA_CLIENT, cola_start},
-    {"LMCstopmeas", 'M', COLA_CLIENT, cola_stop},
-    {"LMCstandby", 'M', COLA_CLIENT, cola_stop},
-    {"LSPsetdatetime", 'M', COLA_CLIENT, cola_set_clock},
-    {"mEEwriteall", 'M', COLA_CLIENT, cola_keep},
-    {"mSCloadappdef", 'M', COLA_CLIENT, cola_load_defaults},
-    {"mSCloadfacdef", 'M', COLA_CLIENT, cola_load_defaults},
-    {"mSCreboot", 'M', COLA_CLIENT, cola_reboot},
-    {"LMDscandata", 'E', COLA_RUN, set_scan_event},
-    {"LIDinputstate", 'E', COLA_RUN, cola_set_inputs_event},
-    {"LIDoutputstate", 'E', COLA_RUN, cola_set_outputs_event},
-    {"LFErec", 'E', COLA_RUN, cola_set_results_event},
+    {"0", 'R', COLA_RUN, "", cola_read_ident},
+    {"DeviceIdent", 'R', COLA_RUN, "", cola_read_ident},
+    {"SerialNumber", 'R', COLA_RUN, "", cola_read_serial},
+    {"FirmwareVersion", 'R', COLA_RUN, "", cola_read_firmware},
+    {"LocationName", 'R', COLA_RUN, "", cola_read_location},
+    {"LocationName", 'W', COLA_CLIENT, NULL, cola_write_location},
+    {"SCdevicestate", 'R', COLA_RUN, "", cola_read_state},
+    {"STlms", 'R', COLA_RUN, "", cola_read_lms_state},
+    {"LCMstate", 'R', COLA_RUN, "", cola_read_contamination},
+    {"ODoprh", 'R', COLA_RUN, "", cola_read_hours},
+    {"ODpwrc", 'R', COLA_RUN, "", cola_read_power_ons},
+    {"EIHstCola", 'R', COLA_RUN, "", cola_read_framing},
+    {"EIHstCola", 'W', COLA_CLIENT, "1", cola_write_framing},
+    {"LMPoutputRange", 'R', COLA_RUN, "", cola_read_output_range},
+    {"LMPoutputRange", 'W', COLA_CLIENT, "24ii", cola_write_output_range},
+    {"LMPscancfg", 'R', COLA_RUN, "", cola_read_scan_cfg},
+    {"LMDscandatacfg", 'R', COLA_RUN, "", cola_read_scan_data_cfg},
+    {"LMDscandatacfg", 'W', COLA_CLIENT, "111111111112", cola_write_scan_data_cfg},
+    {"LMDscandatascalefactor", 'R', COLA_RUN, "", cola_read_scale},
+    {"LMDscandatascalefactor", 'W', COLA_CLIENT, "4", cola_write_scale},
+    {"FREchoFilter", 'R', COLA_RUN, "", cola_read_filter},
+    {"FREchoFilter", 'W', COLA_CLIENT, "1", cola_write_filter},
+    {"LMDscandata", 'R', COLA_RUN, "", cola_read_scan},
+    {"LIDinputstate", 'R', COLA_RUN, "", cola_read_inputs},
+    {"LIDoutputstate", 'R', COLA_RUN, "", cola_read_outputs},
+    {"LFErec", 'R', COLA_RUN, "", cola_read_field_results},
+    {"FieldSetSelectionMethod", 'R', COLA_RUN, "?", cola_read_set_method},
+    {"FieldSetSelectionMethod", 'W', COLA_CLIENT, "?s", cola_write_set_method},
+    {"ActiveFieldSet", 'R', COLA_RUN, "?", cola_read_set},
+    {"ActiveFieldSet", 'W', COLA_CLIENT, "?2", cola_write_set},
+    {"TSCRole", 'R', COLA_RUN, "", cola_read_time_role},
+    {"TSCRole", 'W', COLA_CLIENT, "1", cola_write_time_role},
+    {"TSCTCInterface", 'R', COLA_RUN, "", cola_read_time_interface},
+    {"TSCTCInterface", 'W', COLA_CLIENT, "1", cola_write_time_interface},
+    {"TSCTCSrvAddr", 'R', COLA_RUN, "", cola_read_time_address},
+    {"TSCTCSrvAddr", 'W', COLA_CLIENT, "1111", cola_write_time_address},
+    {"TSCTCtimezone", 'R', COLA_RUN, "", cola_read_time_zone},
+    {"TSCTCtimezone", 'W', COLA_CLIENT, "1", cola_write_time_zone},
+    {"TSCTCupdatetime", 'R', COLA_RUN, "", cola_read_time_update},
+    {"TSCTCupdatetime", 'W', COLA_CLIENT, "4", cola_write_time_update},
+    {"TSCTCmaxoffset", 'R', COLA_RUN, "", cola_read_time_limit},
+    {"TSCTCdelay", 'R', COLA_RUN, "", cola_read_time_delay},
+    {"SetAccessMode", 'M', COLA_RUN, "14", cola_log_in},
+    {"GetAccessMode", 'M', COLA_RUN, "", cola_get_level},
+    {"CheckPassword", 'M', COLA_RUN, "14", cola_check_password},
+    {"Run", 'M', COLA_RUN, "", cola_log_out},
+    {"mLMPsetscancfg", 'M', COLA_CLIENT, "4h4ii", cola_set_scan_cfg},
+    {"LMCstartmeas", 'M', COLA_CLIENT, "", cola_start},
+    {"LMCstopmeas", 'M', COLA_CLIENT, "", cola_stop},
+    {"LMCstandby", 'M', COLA_CLIENT, "", cola_stop},
+    {"LSPsetdatetime", 'M', COLA_CLIENT, "2111114", cola_set_clock},
+    {"mEEwriteall", 'M', COLA_CLIENT, "", cola_keep},
+    {"mSCloadappdef", 'M', COLA_CLIENT, "", cola_load_defaults},
+    {"mSCloadfacdef", 'M', COLA_CLIENT, "", cola_load_defaults},
+    {"mSCreboot", 'M', COLA_CLIENT, "", cola_reboot},
+    {"LMDscandata", 'E', COLA_RUN, "s", set_scan_event},
+    {"LIDinputstate", 'E', COLA_RUN, "s", cola_set_inputs_event},
+    {"LIDoutputstate", 'E', COLA_RUN, "s", cola_set_outputs_event},
+    {"LFErec", 'E', COLA_RUN, "s", cola_set_results_event},
 };
 
 /* field000 and on */
-static const struct command any_field = {"field", 'R', COLA_RUN, cola_read_field},
-                            set_field = {"field", 'W', COLA_CLIENT, cola_write_field};
+static const struct command any_field = {"field", 'R', COLA_RUN, "", cola_read_field},
+                            set_field = {"field", 'W', COLA_CLIENT, NULL, cola_write_field};
 
-enum cola_error cola_read_switch(struct cola_args *args, int *on)
+static enum cola_error set_scan_event(struct cola *self)
 {
-    const uint32_t v = cola_arg_u(args, 1);
-    const enum cola_error error = cola_args_end(args);
-    *on = v == 1;
-    return error == COLA_OK && v > 1 ? COLA_INVALID_DATA : error;
-}
-
-static enum cola_error set_scan_event(struct cola *self, struct cola_args *args, struct cola_out *out)
-{
-    int on;
-    const enum cola_error error = cola_read_switch(args, &on);
-    if (error != COLA_OK) return error;
-    cola_put_u(out, 1, (uint32_t)on);
-    self->streams = on;
+    self->streams = (int)self->arg[0];
     self->since_sent = self->set.every; /* the next one is sent */
-    if (on && self->measures) cola_start_scan(self);
+    if (self->streams && self->measures) cola_start_scan(self);
     return COLA_OK;
 }
 
@@ -160,7 +151,22 @@ static const char *answer_verb(char verb)
     return verb == 'R' ? "sRA" : verb == 'W' ? "sWA" : verb == 'M' ? "sAN" : "sEA";
 }
 
-static enum cola_error carry_out(struct cola *self, const struct cola_request *request, struct cola_out *out)
+static enum cola_error read_values(struct cola *self, const char *values)
+{
+    struct cola_args *const args = &self->args;
+    if (values == NULL) return COLA_OK;
+    if (*values == '?' && !cola_has_sets(self)) return COLA_VARIABLE_UNKNOWN;
+    values += *values == '?';
+    for (size_t i = 0; values[i] != '\0'; i++)
+        if (values[i] == 'h' || values[i] == 'i')
+            self->arg[i] = (uint32_t)cola_arg_i(args, values[i] == 'h' ? 2 : 4);
+        else
+            self->arg[i] = cola_arg_u(args, values[i] == 's' ? 1 : (unsigned)(values[i] - '0'));
+    const enum cola_error error = cola_args_end(args);
+    return error == COLA_OK && *values == 's' && self->arg[0] > 1 ? COLA_INVALID_DATA : error;
+}
+
+static enum cola_error carry_out(struct cola *self, const struct cola_request *request)
 {
     struct parts p = cut(request);
     enum cola_error error = COLA_COMMAND_UNKNOWN;
@@ -170,8 +176,11 @@ static enum cola_error carry_out(struct cola *self, const struct cola_request *r
     if (c == NULL) return error;
     if (c->level > self->level) return c->verb == 'W' ? COLA_WRITE_DENIED : COLA_METHOD_DENIED;
     snprintf(head, sizeof head, "%s %s", answer_verb(p.verb), p.name);
-    cola_begin(out, request->form, head);
-    return c->carry_out(self, &p.args, out);
+    cola_begin(&self->out, request->form, head);
+    self->args = p.args;
+    error = read_values(self, c->values);
+    if (error == COLA_OK && c->verb == 'E') cola_put_u(&self->out, 1, self->arg[0]);
+    return error == COLA_OK ? c->carry_out(self) : error;
 }
 
 /* The head's power cycle ends all sessions. Where there can't be one, as with a recording, only this session begins
@@ -186,16 +195,16 @@ static void reboot(struct cola *self)
 
 void cola_carry_out(struct cola *self, const struct cola_request *request)
 {
-    struct cola_out out = {.buf = self->unit, .cap = sizeof self->unit};
     const uint16_t telegrams = self->telegrams;
     cola_deliver(self); /* a scan from before the request still has the form from before it */
     cola_look_at_head(self);
     self->stream_form = request->form;
-    const enum cola_error error = carry_out(self, request, &out);
+    self->out = (struct cola_out){.buf = self->unit, .cap = sizeof self->unit};
+    const enum cola_error error = carry_out(self, request);
     if (error == COLA_LATER) return;
     if (error != COLA_OK)
         cola_refuse(self, request->form, error);
-    else if (self->spec.host.send(self->spec.host.ctx, self->unit, cola_end(&out)) != 0)
+    else if (self->spec.host.send(self->spec.host.ctx, self->unit, cola_end(&self->out)) != 0)
         self->telegrams = telegrams;
     if (self->outputs_due) cola_send_outputs(self, request->form);
     if (self->reboots) reboot(self);

@@ -15,38 +15,37 @@ static const char *version(const struct cola *self)
     return self->spec.identity->firmware[0] != 0 ? self->spec.identity->firmware : self->model->version;
 }
 
-enum cola_error cola_read_ident(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_read_ident(struct cola *self)
 {
-    cola_put_text(out, self->spec.identity->model);
-    cola_put_text(out, version(self));
-    return cola_args_end(args);
+    cola_put_text(&self->out, self->spec.identity->model);
+    cola_put_text(&self->out, version(self));
+    return COLA_OK;
 }
 
-enum cola_error cola_read_serial(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_read_serial(struct cola *self)
 {
-    cola_put_text(out, self->spec.identity->serial);
-    return cola_args_end(args);
+    cola_put_text(&self->out, self->spec.identity->serial);
+    return COLA_OK;
 }
 
-enum cola_error cola_read_firmware(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_read_firmware(struct cola *self)
 {
     const char *const v = version(self);
-    cola_put_text(out, strcmp(v, self->model->version) == 0 ? self->model->firmware : v);
-    return cola_args_end(args);
+    cola_put_text(&self->out, strcmp(v, self->model->version) == 0 ? self->model->firmware : v);
+    return COLA_OK;
 }
 
-enum cola_error cola_read_location(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_read_location(struct cola *self)
 {
-    cola_put_text(out, self->set.location);
-    return cola_args_end(args);
+    cola_put_text(&self->out, self->set.location);
+    return COLA_OK;
 }
 
-enum cola_error cola_write_location(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_write_location(struct cola *self)
 {
     char name[MOST_LOCATION + 1];
-    (void)out;
-    cola_arg_text(args, name, sizeof name);
-    const enum cola_error error = cola_args_end(args);
+    cola_arg_text(&self->args, name, sizeof name);
+    const enum cola_error error = cola_args_end(&self->args);
     if (error != COLA_OK) return error;
     for (const char *c = name; *c != '\0'; c++)
         if (*c < 0x20 || *c > 0x7e) return COLA_INVALID_DATA; /* mEEwriteall writes it as a line of the settings file */
@@ -56,19 +55,19 @@ enum cola_error cola_write_location(struct cola *self, struct cola_args *args, s
 
 /* ---- states */
 
-enum cola_error cola_read_state(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_read_state(struct cola *self)
 {
     enum { BUSY, READY, ERROR };
     const enum protocol_head_state head = protocol_ask_state(&self->spec.host);
     if (head == PROTOCOL_HEAD_FAULT)
-        cola_put_u(out, 1, ERROR);
+        cola_put_u(&self->out, 1, ERROR);
     else
-        cola_put_u(out, 1, head <= PROTOCOL_HEAD_BOOT || !self->scan.head.known ? BUSY : READY);
-    return cola_args_end(args);
+        cola_put_u(&self->out, 1, head <= PROTOCOL_HEAD_BOOT || !self->scan.head.known ? BUSY : READY);
+    return COLA_OK;
 }
 
 /* u16 state, u8 temperature, text time, text date, 3 x u16 LED */
-enum cola_error cola_read_lms_state(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_read_lms_state(struct cola *self)
 {
     enum { UNDEFINED, INITIALISATION, CONFIGURATION, REST, ROTATES, PREPARATION, READY, MEASURES };
     static const uint8_t states[] = {INITIALISATION, INITIALISATION, REST, PREPARATION, MEASURES, ROTATES, UNDEFINED};
@@ -77,19 +76,19 @@ enum cola_error cola_read_lms_state(struct cola *self, struct cola_args *args, s
     uint32_t state = head == PROTOCOL_HEAD_UNKNOWN ? (uint32_t)UNDEFINED : states[head];
     char text[40];
     if (state == MEASURES && !self->measures) state = READY;
-    cola_put_u(out, 2, state);
-    cola_put_u(out, 1, 0);
+    cola_put_u(&self->out, 2, state);
+    cola_put_u(&self->out, 1, 0);
     snprintf(text, sizeof text, "%02u:%02u:%02u", d.hour, d.minute, d.second);
-    cola_put_text(out, text);
+    cola_put_text(&self->out, text);
     snprintf(text, sizeof text, "%02u.%02u.%04u", d.day, d.month, d.year);
-    cola_put_text(out, text);
+    cola_put_text(&self->out, text);
     for (int i = 0; i < 3; i++)
-        cola_put_u(out, 2, 0);
-    return cola_args_end(args);
+        cola_put_u(&self->out, 2, 0);
+    return COLA_OK;
 }
 
 /* u8 0 none, 1 warning, 2 error, 3 serious error */
-enum cola_error cola_read_contamination(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_read_contamination(struct cola *self)
 {
     static const double levels_db[] = {1.0, 3.0, 10.0};
     const double loss_db =
@@ -97,62 +96,55 @@ enum cola_error cola_read_contamination(struct cola *self, struct cola_args *arg
     uint32_t level = 0;
     while (level < 3 && loss_db >= levels_db[level])
         level++;
-    cola_put_u(out, 1, level);
-    return cola_args_end(args);
+    cola_put_u(&self->out, 1, level);
+    return COLA_OK;
 }
 
-enum cola_error cola_read_hours(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_read_hours(struct cola *self)
 {
     const int64_t tenth_ns = INT64_C(360000000000);
-    cola_put_u(out, 4, (uint32_t)((self->now_ns - self->spec.power_ns) / tenth_ns));
-    return cola_args_end(args);
+    cola_put_u(&self->out, 4, (uint32_t)((self->now_ns - self->spec.power_ns) / tenth_ns));
+    return COLA_OK;
 }
 
-enum cola_error cola_read_power_ons(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_read_power_ons(struct cola *self)
 {
-    cola_put_u(out, 4, self->spec.power_ons);
-    return cola_args_end(args);
+    cola_put_u(&self->out, 4, self->spec.power_ons);
+    return COLA_OK;
 }
 
 /* ---- log-in */
 
-static int password_fits(uint32_t level, uint32_t hash)
+static int password_fits(const struct cola *self)
 {
+    const uint32_t level = self->arg[0], hash = self->arg[1];
     return (level == COLA_MAINTENANCE && hash == 0xb21ace26) || (level == COLA_CLIENT && hash == 0xf4724744) ||
            (level == COLA_SERVICE && hash == 0x81be23aa);
 }
 
 /* u8 level, u32 hash of the password; u8 1: done */
-enum cola_error cola_log_in(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_log_in(struct cola *self)
 {
-    const uint32_t level = cola_arg_u(args, 1), hash = cola_arg_u(args, 4);
-    const enum cola_error error = cola_args_end(args);
-    if (error != COLA_OK) return error;
-    if (password_fits(level, hash)) self->level = (enum cola_level)level;
-    cola_put_u(out, 1, (uint32_t)password_fits(level, hash));
+    if (password_fits(self)) self->level = (enum cola_level)self->arg[0];
+    return cola_check_password(self);
+}
+
+enum cola_error cola_check_password(struct cola *self)
+{
+    cola_put_u(&self->out, 1, (uint32_t)password_fits(self));
     return COLA_OK;
 }
 
-enum cola_error cola_check_password(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_get_level(struct cola *self)
 {
-    const uint32_t level = cola_arg_u(args, 1), hash = cola_arg_u(args, 4);
-    (void)self;
-    cola_put_u(out, 1, (uint32_t)password_fits(level, hash));
-    return cola_args_end(args);
+    cola_put_u(&self->out, 1, (uint32_t)self->level);
+    return COLA_OK;
 }
 
-enum cola_error cola_get_level(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_log_out(struct cola *self)
 {
-    cola_put_u(out, 1, (uint32_t)self->level);
-    return cola_args_end(args);
-}
-
-enum cola_error cola_log_out(struct cola *self, struct cola_args *args, struct cola_out *out)
-{
-    const enum cola_error error = cola_args_end(args);
-    if (error != COLA_OK) return error;
     self->level = COLA_RUN;
-    cola_put_u(out, 1, 1);
+    cola_put_u(&self->out, 1, 1);
     return COLA_OK;
 }
 
@@ -176,44 +168,35 @@ int cola_start_scan(struct cola *self)
 }
 
 /* u8 0: measures; 1: not allowed; polls that wait are then refused */
-enum cola_error cola_start(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_start(struct cola *self)
 {
-    const enum cola_error error = cola_args_end(args);
-    if (error != COLA_OK) return error;
     const int refused = cola_start_scan(self);
     if (!refused) self->measures = self->started = 1;
-    cola_put_u(out, 1, (uint32_t)refused);
+    cola_put_u(&self->out, 1, (uint32_t)refused);
     return COLA_OK;
 }
 
 /* Stops the output of this session alone: the head goes on, since others may read it. */
-enum cola_error cola_stop(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_stop(struct cola *self)
 {
-    const enum cola_error error = cola_args_end(args);
-    if (error != COLA_OK) return error;
     self->measures = self->started = 0;
     self->wish.lasts &= self->n_waiting != 0; /* a poll is answered also where nothing is measured */
     cola_ports_select(self);                  /* drops the fields' results: they are out of date from now on */
-    cola_put_u(out, 1, 0);
+    cola_put_u(&self->out, 1, 0);
     return COLA_OK;
 }
 
 /* ---- defaults and reboot */
 
-enum cola_error cola_load_defaults(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_load_defaults(struct cola *self)
 {
-    const enum cola_error error = cola_args_end(args);
-    (void)out;
-    if (error != COLA_OK) return error;
     cola_settings_reset(self);
     cola_fields_load(self);
     return COLA_OK;
 }
 
-enum cola_error cola_reboot(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_reboot(struct cola *self)
 {
-    const enum cola_error error = cola_args_end(args);
-    (void)out;
-    if (error == COLA_OK) self->reboots = 1;
-    return error;
+    self->reboots = 1;
+    return COLA_OK;
 }

@@ -42,19 +42,16 @@ void cola_follow_dialect(struct cola *self)
     if (is_strict(self)) self->stream_form = (enum cola_form)cola_framing(self);
 }
 
-enum cola_error cola_read_framing(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_read_framing(struct cola *self)
 {
-    cola_put_u(out, 1, cola_framing(self));
-    return cola_args_end(args);
+    cola_put_u(&self->out, 1, cola_framing(self));
+    return COLA_OK;
 }
 
 /* The answer still has the form of its request. */
-enum cola_error cola_write_framing(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_write_framing(struct cola *self)
 {
-    const uint32_t form = cola_arg_u(args, 1);
-    const enum cola_error error = cola_args_end(args);
-    (void)out;
-    if (error != COLA_OK) return error;
+    const uint32_t form = self->arg[0];
     if (form > COLA_B) return COLA_INVALID_DATA;
     self->set.framing = (uint8_t)form;
     self->stream_form = (enum cola_form)form;

@@ -58,11 +58,11 @@ static void put_scan_cfg(const struct planar_head *head, struct cola_out *out)
     cola_put_i(out, 4, cola_beam_angle(head, head->n - 1));
 }
 
-enum cola_error cola_read_scan_cfg(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_read_scan_cfg(struct cola *self)
 {
     if (!cola_head(self)->known) return COLA_CONDITION;
-    put_scan_cfg(cola_head(self), out);
-    return cola_args_end(args);
+    put_scan_cfg(cola_head(self), &self->out);
+    return COLA_OK;
 }
 
 /* ---- mLMPsetscancfg: as LMPscancfg; u8 status before it in the answer */
@@ -128,17 +128,15 @@ static int come_to_rest(struct cola *self)
     return state != PROTOCOL_HEAD_SPIN_DOWN || self->rests;
 }
 
-enum cola_error cola_set_scan_cfg(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_set_scan_cfg(struct cola *self)
 {
     struct planar_head wanted = *cola_head(self);
-    struct scan_cfg asked;
-    asked.scan_chz = cola_arg_u(args, 4);
-    asked.sectors = cola_arg_i(args, 2);
-    asked.step = cola_arg_u(args, 4);
-    asked.start_e4 = cola_arg_i(args, 4);
-    asked.stop_e4 = cola_arg_i(args, 4);
-    enum cola_error error = cola_args_end(args);
-    if (error != COLA_OK) return error;
+    const struct scan_cfg asked = {.scan_chz = self->arg[0],
+                                   .sectors = (int32_t)self->arg[1],
+                                   .step = self->arg[2],
+                                   .start_e4 = (int32_t)self->arg[3],
+                                   .stop_e4 = (int32_t)self->arg[4]};
+    enum cola_error error = COLA_OK;
     if (!cola_head(self)->known || self->next.is_due) return COLA_CONDITION;
     uint32_t status = cola_geometry_find(self, &asked, &wanted);
     const int other =
@@ -148,14 +146,14 @@ enum cola_error cola_set_scan_cfg(struct cola *self, struct cola_args *args, str
     if (other && status == OK) {
         self->next.lines_uhz = (int64_t)wanted.lines_uhz;
         self->next.steps = wanted.steps;
-        self->next.form = out->form;
+        self->next.form = self->out.form;
         const int rests = come_to_rest(self);
         self->next.is_due = rests == 0;
         if (rests <= 0) return rests < 0 ? COLA_CONDITION : COLA_LATER;
         error = set_head(self);
     }
-    cola_put_u(out, 1, status);
-    put_scan_cfg(cola_head(self), out);
+    cola_put_u(&self->out, 1, status);
+    put_scan_cfg(cola_head(self), &self->out);
     return error;
 }
 

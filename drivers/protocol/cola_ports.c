@@ -92,36 +92,35 @@ static void describe_empty(const struct cola *self, struct cola_record *r)
 }
 
 /* The angle of a rectangle's corner counts from the first beam in a TiM, from angle 0 in an LMS1xx. */
-enum cola_error cola_read_field(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_read_field(struct cola *self)
 {
     const struct cola_field *f = &self->fields.field[self->field];
     struct cola_record record;
     if (self->field >= self->model->n_records) {
-        cola_put_u(out, 1, 0);
-        return cola_args_end(args);
+        cola_put_u(&self->out, 1, 0);
+        return COLA_OK;
     }
     if (!cola_head(self)->known) return COLA_CONDITION;
     if (f->has_record) {
-        cola_record_put(&f->record, out);
-        return cola_args_end(args);
+        cola_record_put(&f->record, &self->out);
+        return COLA_OK;
     }
     if (f->shape.kind == COLA_SHAPE_NONE)
         describe_empty(self, &record);
     else
         cola_field_describe(f, cola_head(self), !cola_ports_is_lms(self), &record);
     record.number = (uint8_t)(self->model->named || f->shape.kind != COLA_SHAPE_NONE ? self->field + 1 : 0);
-    cola_record_put(&record, out);
-    return cola_args_end(args);
+    cola_record_put(&record, &self->out);
+    return COLA_OK;
 }
 
 /* The field keeps the response time and the blanking size of the configuration: no telegram is known that has them. */
-enum cola_error cola_write_field(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_write_field(struct cola *self)
 {
     struct cola_field *f = &self->fields.field[self->field];
     struct cola_record record;
     struct cola_shape shape;
-    (void)out;
-    enum cola_error error = cola_record_take(args, &record);
+    enum cola_error error = cola_record_take(&self->args, &record);
     if (error != COLA_OK) return error;
     if (!cola_head(self)->known) return COLA_CONDITION;
     error = cola_record_shape(&record, cola_head(self), !cola_ports_is_lms(self), &shape);
@@ -157,25 +156,24 @@ static void put_results(const struct cola *self, struct cola_out *out)
     }
 }
 
-enum cola_error cola_read_field_results(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_read_field_results(struct cola *self)
 {
     if (self->watch.n != 0 && !cola_head(self)->known) return COLA_CONDITION;
-    put_results(self, out);
-    return cola_args_end(args);
+    put_results(self, &self->out);
+    return COLA_OK;
 }
 
 /* ---- which set of fields a TiM watches. Other models don't have these variables. */
 
-static int has_sets(const struct cola *self)
+int cola_has_sets(const struct cola *self)
 {
     return !cola_ports_is_lms(self) && self->model->n_results != 0;
 }
 
-enum cola_error cola_read_set_method(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_read_set_method(struct cola *self)
 {
-    if (!has_sets(self)) return COLA_VARIABLE_UNKNOWN;
-    cola_put_u(out, 1, self->ports.by_telegram);
-    return cola_args_end(args);
+    cola_put_u(&self->out, 1, self->ports.by_telegram);
+    return COLA_OK;
 }
 
 static void take_set(struct cola *self, uint32_t set)
@@ -185,32 +183,22 @@ static void take_set(struct cola *self, uint32_t set)
     cola_ports_select(self);
 }
 
-enum cola_error cola_write_set_method(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_write_set_method(struct cola *self)
 {
-    int by_telegram;
-    (void)out;
-    if (!has_sets(self)) return COLA_VARIABLE_UNKNOWN;
-    const enum cola_error error = cola_read_switch(args, &by_telegram);
-    if (error != COLA_OK) return error;
-    self->ports.by_telegram = (uint8_t)by_telegram;
-    if (!by_telegram) take_set(self, self->ports.seen + 1);
+    self->ports.by_telegram = (uint8_t)self->arg[0];
+    if (!self->ports.by_telegram) take_set(self, self->ports.seen + 1);
     return COLA_OK;
 }
 
-enum cola_error cola_read_set(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_read_set(struct cola *self)
 {
-    if (!has_sets(self)) return COLA_VARIABLE_UNKNOWN;
-    cola_put_u(out, 2, self->ports.set);
-    return cola_args_end(args);
+    cola_put_u(&self->out, 2, self->ports.set);
+    return COLA_OK;
 }
 
-enum cola_error cola_write_set(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_write_set(struct cola *self)
 {
-    (void)out;
-    if (!has_sets(self)) return COLA_VARIABLE_UNKNOWN;
-    const uint32_t set = cola_arg_u(args, 2);
-    const enum cola_error error = cola_args_end(args);
-    if (error != COLA_OK) return error;
+    const uint32_t set = self->arg[0];
     if (set < 1 || set > SETS) return COLA_INVALID_DATA;
     if (!self->ports.by_telegram) return COLA_CONDITION;
     take_set(self, set);
@@ -230,10 +218,10 @@ static void put_inputs(const struct cola *self, struct cola_out *out)
     cola_put_u(out, 2, 0);
 }
 
-enum cola_error cola_read_inputs(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_read_inputs(struct cola *self)
 {
-    put_inputs(self, out);
-    return cola_args_end(args);
+    put_inputs(self, &self->out);
+    return COLA_OK;
 }
 
 /* u16 version, u32 time, for each output u8 state and u32 count, then u16 0, or u16 1 and the time of day */
@@ -251,10 +239,10 @@ static void put_outputs(const struct cola *self, struct cola_out *out)
     if (lms) cola_put_time(self, self->now_ns, out);
 }
 
-enum cola_error cola_read_outputs(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_read_outputs(struct cola *self)
 {
-    put_outputs(self, out);
-    return cola_args_end(args);
+    put_outputs(self, &self->out);
+    return COLA_OK;
 }
 
 /* ---- events */
@@ -293,29 +281,22 @@ void cola_ports_time(struct cola *self)
     if (self->ports.inputs) send_event(self, self->stream_form, "sSN LIDinputstate", put_inputs);
 }
 
-static enum cola_error set_event(int *event, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_set_results_event(struct cola *self)
 {
-    int on;
-    const enum cola_error error = cola_read_switch(args, &on);
-    cola_put_u(out, 1, (uint32_t)on);
-    if (error == COLA_OK) *event = on;
-    return error;
+    self->ports.results = (int)self->arg[0];
+    return COLA_OK;
 }
 
-enum cola_error cola_set_results_event(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_set_inputs_event(struct cola *self)
 {
-    return set_event(&self->ports.results, args, out);
-}
-
-enum cola_error cola_set_inputs_event(struct cola *self, struct cola_args *args, struct cola_out *out)
-{
-    return set_event(&self->ports.inputs, args, out);
+    self->ports.inputs = (int)self->arg[0];
+    return COLA_OK;
 }
 
 /* A scanner of the LMS kind sends the state once when it is asked for, though nothing has changed. */
-enum cola_error cola_set_outputs_event(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_set_outputs_event(struct cola *self)
 {
-    const enum cola_error error = set_event(&self->ports.outputs, args, out);
-    self->outputs_due = error == COLA_OK && self->ports.outputs && cola_ports_is_lms(self);
-    return error;
+    self->ports.outputs = (int)self->arg[0];
+    self->outputs_due = self->ports.outputs && cola_ports_is_lms(self);
+    return COLA_OK;
 }

@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "core/bytes.h"
 #include "drivers/protocol/cola.h"
 
 void cola_settings_reset(struct cola *self)
@@ -31,27 +32,24 @@ struct cola_beams cola_sent_beams(const struct cola *self, const struct planar_h
     return (struct cola_beams){first, clamped(cola_beam_at(head, self->set.stop_e4), head) - first + 1};
 }
 
-enum cola_error cola_read_output_range(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_read_output_range(struct cola *self)
 {
     const struct planar_head *head = cola_head(self);
     if (!head->known) return COLA_CONDITION;
     const struct cola_beams beams = cola_sent_beams(self, head);
-    cola_put_u(out, 2, 1);
-    cola_put_u(out, 4, cola_step_angle(head));
-    cola_put_i(out, 4, cola_beam_angle(head, beams.first));
-    cola_put_i(out, 4, cola_beam_angle(head, beams.first + beams.n - 1));
-    return cola_args_end(args);
+    cola_put_u(&self->out, 2, 1);
+    cola_put_u(&self->out, 4, cola_step_angle(head));
+    cola_put_i(&self->out, 4, cola_beam_angle(head, beams.first));
+    cola_put_i(&self->out, 4, cola_beam_angle(head, beams.first + beams.n - 1));
+    return COLA_OK;
 }
 
 /* An end between two beams becomes the nearest one, as in the real scanner. */
-enum cola_error cola_write_output_range(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_write_output_range(struct cola *self)
 {
     const struct planar_head *head = cola_head(self);
-    const uint32_t sectors = cola_arg_u(args, 2), step = cola_arg_u(args, 4);
-    const int32_t start_e4 = cola_arg_i(args, 4), stop_e4 = cola_arg_i(args, 4);
-    (void)out;
-    const enum cola_error error = cola_args_end(args);
-    if (error != COLA_OK) return error;
+    const uint32_t sectors = self->arg[0], step = self->arg[1];
+    const int32_t start_e4 = (int32_t)self->arg[2], stop_e4 = (int32_t)self->arg[3];
     if (!head->known) return COLA_CONDITION;
     if (sectors != 1 || step != cola_step_angle(head) || start_e4 > stop_e4) return COLA_INVALID_DATA;
     const int64_t first = cola_beam_at(head, start_e4), last = cola_beam_at(head, stop_e4);
@@ -73,14 +71,14 @@ void cola_list_cfg(struct cola_settings *s, uint8_t *bytes[COLA_CFG_BYTES])
     memcpy(bytes, list, sizeof list);
 }
 
-enum cola_error cola_read_scan_data_cfg(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_read_scan_data_cfg(struct cola *self)
 {
     uint8_t *bytes[COLA_CFG_BYTES];
     cola_list_cfg(&self->set, bytes);
     for (int i = 0; i < COLA_CFG_BYTES; i++)
-        cola_put_u(out, 1, *bytes[i]);
-    cola_put_u(out, 2, self->set.every);
-    return cola_args_end(args);
+        cola_put_u(&self->out, 1, *bytes[i]);
+    cola_put_u(&self->out, 2, self->set.every);
+    return COLA_OK;
 }
 
 int cola_scan_data_fits(const struct cola *self, const struct cola_settings *s)
@@ -91,17 +89,14 @@ int cola_scan_data_fits(const struct cola *self, const struct cola_settings *s)
            s->time <= 1;
 }
 
-enum cola_error cola_write_scan_data_cfg(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_write_scan_data_cfg(struct cola *self)
 {
     struct cola_settings s = self->set;
     uint8_t *bytes[COLA_CFG_BYTES];
-    (void)out;
     cola_list_cfg(&s, bytes);
     for (int i = 0; i < COLA_CFG_BYTES; i++)
-        *bytes[i] = (uint8_t)cola_arg_u(args, 1);
-    s.every = (uint16_t)cola_arg_u(args, 2);
-    const enum cola_error error = cola_args_end(args);
-    if (error != COLA_OK) return error;
+        *bytes[i] = (uint8_t)self->arg[i];
+    s.every = (uint16_t)self->arg[COLA_CFG_BYTES];
     if (!cola_scan_data_fits(self, &s)) return COLA_INVALID_DATA;
     self->set = s;
     return COLA_OK;
@@ -109,10 +104,10 @@ enum cola_error cola_write_scan_data_cfg(struct cola *self, struct cola_args *ar
 
 /* ---- FREchoFilter: u8 */
 
-enum cola_error cola_read_filter(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_read_filter(struct cola *self)
 {
-    cola_put_u(out, 1, self->set.filter);
-    return cola_args_end(args);
+    cola_put_u(&self->out, 1, self->set.filter);
+    return COLA_OK;
 }
 
 int cola_filter_fits(const struct cola *self, uint32_t filter)
@@ -120,14 +115,10 @@ int cola_filter_fits(const struct cola *self, uint32_t filter)
     return filter <= COLA_ECHOES_LAST && (filter != COLA_ECHOES_ALL || self->model->echoes > 1);
 }
 
-enum cola_error cola_write_filter(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_write_filter(struct cola *self)
 {
-    const uint32_t filter = cola_arg_u(args, 1);
-    const enum cola_error error = cola_args_end(args);
-    (void)out;
-    if (error != COLA_OK) return error;
-    if (!cola_filter_fits(self, filter)) return COLA_INVALID_DATA;
-    self->set.filter = (uint8_t)filter;
+    if (!cola_filter_fits(self, self->arg[0])) return COLA_INVALID_DATA;
+    self->set.filter = (uint8_t)self->arg[0];
     return COLA_OK;
 }
 
@@ -138,19 +129,16 @@ static float scale_in_use(const struct cola *self)
     return (float)(self->set.scale != 0 ? self->set.scale : cola_head_scale(cola_head(self)));
 }
 
-enum cola_error cola_read_scale(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_read_scale(struct cola *self)
 {
     if (!cola_head(self)->known) return COLA_CONDITION;
-    cola_put_float(out, scale_in_use(self));
-    return cola_args_end(args);
+    cola_put_float(&self->out, scale_in_use(self));
+    return COLA_OK;
 }
 
-enum cola_error cola_write_scale(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_write_scale(struct cola *self)
 {
-    const float scale = cola_arg_float(args);
-    const enum cola_error error = cola_args_end(args);
-    (void)out;
-    if (error != COLA_OK) return error;
+    const float scale = bits_float(self->arg[0]);
     if (!cola_head(self)->known) return COLA_CONDITION;
     /* with 1, ranges over 65.535 m that the head reaches would have no number */
     if (scale != 2.0f && !(scale == 1.0f && cola_head_scale(cola_head(self)) == 1)) return COLA_INVALID_DATA;

@@ -25,19 +25,17 @@ static void put_lines(const struct cola *self, char *text, size_t cap)
     snprintf(text + n, cap - n, "LocationName %s\n", s.location);
 }
 
-enum cola_error cola_keep(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_keep(struct cola *self)
 {
     char text[PROTOCOL_STORED];
-    const enum cola_error error = cola_args_end(args);
     int kept = 1; /* a head without a file answers 1, too, but stores nothing */
-    if (error != COLA_OK) return error;
     if (self->spec.keeps && self->spec.host.store != NULL) {
         put_lines(self, text, sizeof text);
         kept = self->spec.host.command(self->spec.host.ctx, "HEAD:STORe", NULL, 0) == 0 &&
                self->spec.host.store(self->spec.host.ctx, text) == 0;
         if (kept) strcpy(self->stored, text);
     }
-    cola_put_u(out, 1, (uint32_t)kept);
+    cola_put_u(&self->out, 1, (uint32_t)kept);
     return COLA_OK;
 }
 

@@ -87,10 +87,7 @@ int32_t cola_arg_i(struct cola_args *args, unsigned bytes)
 
 float cola_arg_float(struct cola_args *args)
 {
-    const uint32_t bits = cola_arg_u(args, 4);
-    float v;
-    memcpy(&v, &bits, sizeof v);
-    return v;
+    return bits_float(cola_arg_u(args, 4));
 }
 
 void cola_arg_text(struct cola_args *args, char *dst, size_t cap)
@@ -169,12 +166,10 @@ void cola_put_i(struct cola_out *out, unsigned bytes, int32_t v)
 
 void cola_put_float(struct cola_out *out, float v)
 {
-    uint32_t bits;
-    memcpy(&bits, &v, sizeof bits);
     if (out->form == COLA_A)
-        put_hex(out, bits, 8);
+        put_hex(out, float_bits(v), 8);
     else
-        cola_put_u(out, 4, bits);
+        cola_put_u(out, 4, float_bits(v));
 }
 
 void cola_put_word(struct cola_out *out, const char *word)

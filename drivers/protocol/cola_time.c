@@ -88,39 +88,32 @@ static enum cola_error put_server(struct cola *self, const struct cola_server *s
 }
 
 /* Answers a variable of n numbers of `bytes` bytes each. member: their place in struct cola_server. */
-static enum cola_error read_numbers(struct cola *self, size_t member, int n, unsigned bytes, struct cola_args *args,
-                                    struct cola_out *out)
+static enum cola_error read_numbers(struct cola *self, size_t member, int n, unsigned bytes)
 {
     struct cola_server s;
-    enum cola_error error = cola_args_end(args);
-    if (error == COLA_OK) error = get_server(self, &s);
+    const enum cola_error error = get_server(self, &s);
     for (int i = 0; i < n && error == COLA_OK; i++)
-        cola_put_u(out, bytes, ((const uint32_t *)((const char *)&s + member))[i]);
+        cola_put_u(&self->out, bytes, ((const uint32_t *)((const char *)&s + member))[i]);
     return error;
 }
 
-static enum cola_error write_numbers(struct cola *self, size_t member, int n, unsigned bytes, struct cola_args *args)
+static enum cola_error write_numbers(struct cola *self, size_t member, int n)
 {
     struct cola_server s;
-    uint32_t value[4];
-    for (int i = 0; i < n; i++)
-        value[i] = cola_arg_u(args, bytes);
-    enum cola_error error = cola_args_end(args);
-    if (error == COLA_OK) error = get_server(self, &s);
+    const enum cola_error error = get_server(self, &s);
     if (error != COLA_OK) return error;
-    memcpy((char *)&s + member, value, (size_t)n * sizeof value[0]);
+    memcpy((char *)&s + member, self->arg, (size_t)n * sizeof self->arg[0]);
     return put_server(self, &s);
 }
 
-#define NUMBERS(name, member, n, bytes)                                                                \
-    enum cola_error cola_read_##name(struct cola *self, struct cola_args *args, struct cola_out *out)  \
-    {                                                                                                  \
-        return read_numbers(self, offsetof(struct cola_server, member), n, bytes, args, out);          \
-    }                                                                                                  \
-    enum cola_error cola_write_##name(struct cola *self, struct cola_args *args, struct cola_out *out) \
-    {                                                                                                  \
-        (void)out;                                                                                     \
-        return write_numbers(self, offsetof(struct cola_server, member), n, bytes, args);              \
+#define NUMBERS(name, member, n, bytes)                                            \
+    enum cola_error cola_read_##name(struct cola *self)                            \
+    {                                                                              \
+        return read_numbers(self, offsetof(struct cola_server, member), n, bytes); \
+    }                                                                              \
+    enum cola_error cola_write_##name(struct cola *self)                           \
+    {                                                                              \
+        return write_numbers(self, offsetof(struct cola_server, member), n);       \
     }
 NUMBERS(time_role, role, 1, 1)
 NUMBERS(time_interface, interface, 1, 1)
@@ -130,43 +123,36 @@ NUMBERS(time_address, address, 4, 1)
 
 /* Writes one of the times of TIME:SERVer? STATe as a float, in seconds. which: 0 the limit, 1 the offset, 2 the
  * delay. */
-static enum cola_error put_answered(struct cola *self, int which, struct cola_args *args, struct cola_out *out)
+static enum cola_error put_answered(struct cola *self, int which)
 {
     char reply[PROTOCOL_REPLY];
     int64_t ns[3];
-    const enum cola_error error = cola_args_end(args);
-    if (error != COLA_OK) return error;
     if (self->spec.host.command(self->spec.host.ctx, "TIME:SERVer? STATe", reply, sizeof reply) != 0 ||
         sscanf(reply, "%*[A-Z],%" SCNd64 ",%" SCNd64 ",%" SCNd64, &ns[0], &ns[1], &ns[2]) != 3)
         return COLA_CONDITION;
-    cola_put_float(out, (float)(1e-9 * (double)ns[which]));
+    cola_put_float(&self->out, (float)(1e-9 * (double)ns[which]));
     return COLA_OK;
 }
 
-enum cola_error cola_read_time_limit(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_read_time_limit(struct cola *self)
 {
-    return put_answered(self, 0, args, out);
+    return put_answered(self, 0);
 }
 
-enum cola_error cola_read_time_delay(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_read_time_delay(struct cola *self)
 {
-    return put_answered(self, 2, args, out);
+    return put_answered(self, 2);
 }
 
 /* The request has u16 year; u8 month, day, hour, minute, second; u32 us. The answer is u8 1 if the clock was set, else
  * 0. A client can't set the clock while TSCRole is 1, whether or not a time server answers. */
-enum cola_error cola_set_clock(struct cola *self, struct cola_args *args, struct cola_out *out)
+enum cola_error cola_set_clock(struct cola *self)
 {
-    struct cola_date d = {.year = cola_arg_u(args, 2)};
-    uint32_t *const parts[] = {&d.month, &d.day, &d.hour, &d.minute, &d.second};
+    const uint32_t *const v = self->arg;
+    const struct cola_date d = {v[0], v[1], v[2], v[3], v[4], v[5], v[6]};
     struct cola_server server;
     int64_t ns;
-    for (int i = 0; i < 5; i++)
-        *parts[i] = cola_arg_u(args, 1);
-    d.us = cola_arg_u(args, 4);
-    const enum cola_error error = cola_args_end(args);
-    if (error != COLA_OK) return error;
     const int is_synchronised = get_server(self, &server) == COLA_OK && server.role == 1;
-    cola_put_u(out, 1, (uint32_t)(!is_synchronised && cola_date_ns(&d, &ns) && set_clock(self, ns)));
+    cola_put_u(&self->out, 1, (uint32_t)(!is_synchronised && cola_date_ns(&d, &ns) && set_clock(self, ns)));
     return COLA_OK;
 }

@@ -26,6 +26,7 @@ enum {
     SECTION_LEN = 28, /* without options */
     INTERFACE_LEN = 20,
     SIMPLE_HEAD = 12,
+    STATISTICS_HEAD = 20,
 };
 
 /* ---- writing */
@@ -119,8 +120,15 @@ size_t pcapng_put_statistics(uint8_t *to, uint32_t interface, int64_t t_ns, uint
     le_put32(to + 8, interface);
     le_put32(to + 12, (uint32_t)((uint64_t)t_ns >> 32));
     le_put32(to + 16, (uint32_t)t_ns);
-    uint8_t *at = put_number_option(to + 20, OPTION_RECEIVED, received);
+    uint8_t *at = put_number_option(to + STATISTICS_HEAD, OPTION_RECEIVED, received);
     return end_block(to, put_number_option(at, OPTION_DROPPED_BY_SYSTEM, dropped));
+}
+
+size_t pcapng_put_note(uint8_t *to, const char *text)
+{
+    memset(to, 0, STATISTICS_HEAD);
+    le_put32(to, BLOCK_STATISTICS);
+    return end_block(to, put_text_option(to + STATISTICS_HEAD, OPTION_COMMENT, text));
 }
 
 /* ---- reading */

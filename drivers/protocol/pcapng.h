@@ -44,6 +44,9 @@ size_t pcapng_put_packet(uint8_t *to, uint32_t interface, int64_t t_ns, const vo
 /* Puts statistics of an interface: how many frames came until t_ns, and how many the system dropped. PCAPNG_FRONT_ROOM
  * bytes are enough. */
 size_t pcapng_put_statistics(uint8_t *to, uint32_t interface, int64_t t_ns, uint64_t received, uint64_t dropped);
+/* Puts a text that belongs to no packet: statistics of the first interface without figures, but with a comment.
+ * PCAPNG_FRONT_ROOM bytes are enough. */
+size_t pcapng_put_note(uint8_t *to, const char *text);
 
 /* ---- reading */
 

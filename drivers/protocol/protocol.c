@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "drivers/protocol/protocol.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 /* The one list of protocols. A new one is a file of this folder that defines its protocol_ops, an id in protocol.h, and
@@ -31,7 +32,7 @@ enum protocol_head_state protocol_ask_state(const struct protocol_host *host)
 
 void protocol_lose_input(void *protocol, const uint8_t *bytes, size_t len)
 {
-    const struct protocol_host *host = protocol;
+    const struct protocol_host *host = &((const struct protocol_spec *)protocol)->host;
     (void)bytes;
     host->count(host->ctx, PROTOCOL_INPUT_LOST, len);
 }
@@ -44,4 +45,24 @@ uint8_t protocol_digit_bits(uint8_t c)
 const struct protocol_ops *protocol_ops_get(enum protocol_id id)
 {
     return (unsigned)id < PROTOCOL_N ? protocols[id] : NULL;
+}
+
+int protocol_create(const struct protocol_ops *ops, const struct protocol_spec *spec, void **protocol,
+                    struct sh_err *err)
+{
+    void *self = calloc(1, ops->size);
+    if (self == NULL) return sh_fail(err, SH_ENOMEM, "protocol %s: no memory for %zu bytes", ops->name, ops->size);
+    memcpy(self, spec, sizeof *spec);
+    const int rc = ops->begin != NULL ? ops->begin(self, err) : SH_OK;
+    if (rc == SH_OK)
+        *protocol = self;
+    else
+        free(self);
+    return rc;
+}
+
+void protocol_destroy(const struct protocol_ops *ops, void *protocol)
+{
+    if (ops->end != NULL) ops->end(protocol);
+    free(protocol);
 }

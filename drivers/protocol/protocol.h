@@ -5,7 +5,7 @@
  * Each protocol has one `const struct protocol_ops` in one of the files of this folder. The struct's members are the
  * contract, and protocol.c has the list. Each session of a link has an instance of its own. A protocol does no I/O and
  * has no clock: a test drives it from bytes to bytes with a struct protocol_host of its own. One thread makes all calls
- * on an instance. Nothing is allocated after create().
+ * on an instance. Nothing is allocated after protocol_create().
  *
  * A unit is what must stay together: a datagram on udp, a transfer on USB (which a short packet ends). On byte
  * streams units follow each other without a mark. */
@@ -77,7 +77,7 @@ enum protocol_count {
 };
 
 /* Services of a session's owner for its protocol. ctx is the owner's. All of them may be called from within any
- * op but create and destroy. */
+ * op but begin and end. */
 struct protocol_host {
     void *ctx;
     /* Queues one unit for the client, whole or not at all. 0; or 1: the unit is lost, since there is no room, an
@@ -150,7 +150,7 @@ struct protocol_spec {
     uint32_t power_ons;       /* how often power has come, by power cycles and reboots, with the first time */
     uint32_t near_wrap;       /* how far below their wrap counters begin; 0: they begin at 0 */
     int keeps;                /* 1: store() and HEAD:STORe work; else the device forgets all settings without power */
-    const char *stored;       /* what store() has kept; "": nothing. NULL: as "". Valid during create */
+    const char *stored;       /* what store() has kept; "": nothing. NULL: as "". Valid during begin() */
     int dialect;              /* enum protocol_dialect: the one that the link is configured for */
     _Atomic uint32_t *shared; /* a word of the link that all of its sessions share; 0 at first. NULL: there is none */
     /* 1: the head waits for clients (paces fast and step). Device time then says nothing of how long a client takes, so
@@ -188,11 +188,13 @@ struct protocol_ops {
                       const uint8_t *beams, struct sh_err *err);
     int passes_native; /* 1: the native protocol, which its owner speaks; no member below is set */
 
-    /* When it fails, nothing of it stays. */
-    int (*create)(const struct protocol_spec *spec, void **protocol, struct sh_err *err);
-    void (*destroy)(void *protocol);
+    size_t size; /* of the protocol's own struct, which has a struct protocol_spec as its first member */
+    /* Sets up an instance, which is all 0 but for the spec. When it fails, nothing of it stays. May be NULL. */
+    int (*begin)(void *protocol, struct sh_err *err);
+    /* Frees what the instance holds, but not the instance itself. May be NULL. */
+    void (*end)(void *protocol);
 
-    /* The client is there. t_ns: device time of the tick from which on the client gets frames. */
+    /* The client is there. t_ns: device time of the tick from which on the client gets frames. May be NULL. */
     void (*open)(void *protocol, int64_t t_ns);
     /* One whole native frame, checked, in the order of the stream. A client that joins late gets descriptor,
      * emitter and anchor first. Never called with frames of the geo layout where needs has POLAR. May be NULL: the
@@ -201,7 +203,7 @@ struct protocol_ops {
     /* Frames are missing before the next one: the client, or the head, was too slow. May be NULL, as frame. */
     void (*gap)(void *protocol, uint32_t n_frames);
     /* All frames before device time t_ns have come. Called for each tick, also for a tick without frames. Where the
-     * client was too slow, time jumps after a gap. */
+     * client was too slow, time jumps after a gap. May be NULL. */
     void (*time)(void *protocol, int64_t t_ns);
     /* Bytes from the client, in pieces of any size; from a link of datagrams each call has a whole one. */
     void (*input)(void *protocol, const uint8_t *bytes, size_t len);
@@ -214,15 +216,19 @@ struct protocol_ops {
     /* The client has gone. Something that it asked for may still be due, such as a reboot. May be NULL. */
     void (*gone)(void *protocol);
     /* Device time that must have passed before time() has something to do, unless frames or bytes come. May be NULL:
-     * each tick. next_ns saves wake-ups, no more: time() is called for the other ticks, too. */
+     * each tick, or where there is no time(), never. next_ns saves wake-ups, no more: time() is called for the other ticks, too. */
     int64_t (*next_ns)(const void *protocol);
 };
 
 /* Asks the head for its state (HEAD:STATe?). */
 enum protocol_head_state protocol_ask_state(const struct protocol_host *host);
 
-/* protocol_ops.input of a protocol that takes no bytes: counts them as lost. The first member of the protocol's own
- * struct has to be its struct protocol_host. */
+/* Makes an instance. When it fails, nothing of it stays. */
+int protocol_create(const struct protocol_ops *ops, const struct protocol_spec *spec, void **protocol,
+                    struct sh_err *err);
+void protocol_destroy(const struct protocol_ops *ops, void *protocol);
+
+/* protocol_ops.input of a protocol that takes no bytes: counts them as lost. */
 void protocol_lose_input(void *protocol, const uint8_t *bytes, size_t len);
 
 /* For protocol_ops.content: the bits of a hexadecimal digit that may change in any way. The character is then still a

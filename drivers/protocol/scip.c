@@ -1,5 +1,4 @@
 /* SPDX-License-Identifier: MIT */
-#include <stdlib.h>
 #include <string.h>
 
 #include "drivers/protocol/scip_session.h"
@@ -12,25 +11,22 @@ static void scip_power_up(struct scip *s)
     s->bit_rate = s->model->bit_rate;
     s->rb_ns = s->reboot_ns = INT64_MIN;
     s->stream.active = s->single.active = 0;
-    scan_wish_reset(&s->wish, s->identity);
+    scan_wish_reset(&s->wish, s->spec.identity);
     s->simulation = (struct scip_simulation){0};
     s->n_line = 0;
     s->is_over = s->foul = 0;
 }
 
-static int scip_create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
+static int scip_begin(void *protocol, struct sh_err *err)
 {
-    struct scip *s = calloc(1, sizeof *s);
-    if (s == NULL) return sh_fail(err, SH_ENOMEM, "scip: no memory for a session");
-    s->host = spec->host;
-    s->identity = spec->identity;
-    s->model = scip_model_find(spec->identity->model);
-    s->features = scip_model_features(s->model, spec->identity->firmware);
-    s->epoch_us_ns = spec->power_ns;
-    s->epoch_ns = spec->power_ns + (int64_t)spec->near_wrap * 1000000;
+    struct scip *s = protocol;
+    (void)err;
+    s->model = scip_model_find(s->spec.identity->model);
+    s->features = scip_model_features(s->model, s->spec.identity->firmware);
+    s->epoch_us_ns = s->spec.power_ns;
+    s->epoch_ns = s->spec.power_ns + (int64_t)s->spec.near_wrap * 1000000;
     planar_scan_init(&s->scan);
     scip_power_up(s);
-    *protocol = s;
     return SH_OK;
 }
 
@@ -53,12 +49,12 @@ uint64_t scip_time_us(const struct scip *s, int64_t t_ns)
 void scip_send(struct scip *s)
 {
     scip_reply_end(&s->reply);
-    s->host.send(s->host.ctx, s->reply.bytes, s->reply.len);
+    s->spec.host.send(s->spec.host.ctx, s->reply.bytes, s->reply.len);
 }
 
 void scip_answer(struct scip *s, const char *echo, size_t len, const char *status)
 {
-    if (strcmp(status, "00") != 0 && strcmp(status, "98") != 0) s->host.count(s->host.ctx, PROTOCOL_WRONG, 1);
+    if (strcmp(status, "00") != 0 && strcmp(status, "98") != 0) s->spec.host.count(s->spec.host.ctx, PROTOCOL_WRONG, 1);
     scip_reply_begin(&s->reply, echo, len, status);
     scip_send(s);
 }
@@ -66,7 +62,7 @@ void scip_answer(struct scip *s, const char *echo, size_t len, const char *statu
 /* A line with bytes that no command has is noise, of a wrong bit rate for example: it gets no answer. */
 static void scip_take_line(struct scip *s)
 {
-    if (s->foul) s->host.count(s->host.ctx, PROTOCOL_INPUT_LOST, s->n_line);
+    if (s->foul) s->spec.host.count(s->spec.host.ctx, PROTOCOL_INPUT_LOST, s->n_line);
     if (!s->foul && s->is_over)
         scip_answer(s, s->line, s->n_line, "0B");
     else if (!s->foul && s->n_line != 0)
@@ -93,7 +89,7 @@ static void scip_take_input(void *protocol, const uint8_t *bytes, size_t len)
         s->is_over = 1;
         n_over++;
     }
-    if (n_over != 0) s->host.count(s->host.ctx, PROTOCOL_INPUT_LOST, n_over);
+    if (n_over != 0) s->spec.host.count(s->spec.host.ctx, PROTOCOL_INPUT_LOST, n_over);
 }
 
 static void scip_take_frame(void *protocol, const uint8_t *bytes, size_t len)
@@ -108,9 +104,9 @@ static void scip_take_frame(void *protocol, const uint8_t *bytes, size_t len)
  * session, too. Where there can't be one, as with a recording, only this session ends and begins anew. */
 static void scip_reboot(struct scip *s)
 {
-    const int refused = s->host.command(s->host.ctx, "HEAD:REBOOT", NULL, 0) != 0;
+    const int refused = s->spec.host.command(s->spec.host.ctx, "HEAD:REBOOT", NULL, 0) != 0;
     scip_power_up(s);
-    if (refused) s->host.hang_up(s->host.ctx);
+    if (refused) s->spec.host.hang_up(s->spec.host.ctx);
 }
 
 static void scip_pass_time(void *protocol, int64_t t_ns)
@@ -159,8 +155,8 @@ const struct protocol_ops protocol_scip = {
     .content = scip_content,
     .reseal = scip_reseal,
     .check_head = check_head,
-    .create = scip_create,
-    .destroy = free,
+    .size = sizeof(struct scip),
+    .begin = scip_begin,
     .open = open_session,
     .frame = scip_take_frame, /* .gap is not needed: times and steps of turns show losses */
     .time = scip_pass_time,

@@ -40,7 +40,7 @@ static int reset_speed(struct scip *s)
     if ((s->features & SCIP_MOTOR_SPEED) == 0 ||
         scip_lines_uhz(s, "HEAD:LINES?") == scip_lines_uhz(s, "HEAD:LINES? DEF"))
         return 0;
-    return s->host.command(s->host.ctx, "HEAD:LINES DEF", NULL, 0);
+    return s->spec.host.command(s->spec.host.ctx, "HEAD:LINES DEF", NULL, 0);
 }
 
 /* RT: RS without the timer and the bit rate. */
@@ -73,7 +73,7 @@ static const char *ask_reboot(struct scip *s)
 
 static const char *time_mode(struct scip *s, char code)
 {
-    if (code == '0' && scip_boots(protocol_ask_state(&s->host))) return "10";
+    if (code == '0' && scip_boots(protocol_ask_state(&s->spec.host))) return "10";
     if (code == '0' && s->time_mode) return "02";
     if (code == '0' && (s->stream.active || s->single.active)) return "10";
     if (code == '2' && !s->time_mode) return "03";
@@ -133,7 +133,7 @@ static const char *motor_speed(struct scip *s)
     if (wanted_uhz == now_uhz) return "03";
     snprintf(command, sizeof command, "HEAD:LINES %llu.%06llu", (unsigned long long)(wanted_uhz / 1000000),
              (unsigned long long)(wanted_uhz % 1000000));
-    const int error = s->host.command(s->host.ctx, command, NULL, 0);
+    const int error = s->spec.host.command(s->spec.host.ctx, command, NULL, 0);
     if (error != 0) return error == -222 || error == -221 ? "04" : "10";
     return "00";
 }

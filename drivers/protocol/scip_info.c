@@ -10,7 +10,7 @@
 uint64_t scip_lines_uhz(struct scip *s, const char *query)
 {
     char reply[PROTOCOL_REPLY], *end;
-    if (s->host.command(s->host.ctx, query, reply, sizeof reply) != 0) return s->scan.head.lines_uhz;
+    if (s->spec.host.command(s->spec.host.ctx, query, reply, sizeof reply) != 0) return s->scan.head.lines_uhz;
     const double hz = strtod(reply, &end);
     return end == reply || !(hz > 0 && hz < 1e6) ? s->scan.head.lines_uhz : (uint64_t)llround(hz * 1e6);
 }
@@ -34,11 +34,11 @@ const char *scip_info_version(struct scip *s)
 {
     struct scip_reply *r = &s->reply;
     scip_reply_begin(r, s->line, s->n_line, "00");
-    scip_reply_key(r, "VEND", "%s", or_else(s->model->vendor, s->identity->maker));
-    scip_reply_key(r, "PROD", "%s", or_else(s->model->product, s->identity->model));
-    scip_reply_key(r, "FIRM", "%s", s->identity->firmware);
+    scip_reply_key(r, "VEND", "%s", or_else(s->model->vendor, s->spec.identity->maker));
+    scip_reply_key(r, "PROD", "%s", or_else(s->model->product, s->spec.identity->model));
+    scip_reply_key(r, "FIRM", "%s", s->spec.identity->firmware);
     scip_reply_key(r, "PROT", "%s", s->model->protocol);
-    scip_reply_key(r, "SERI", "%s", s->identity->serial);
+    scip_reply_key(r, "SERI", "%s", s->spec.identity->serial);
     scip_send(s);
     return NULL;
 }
@@ -50,7 +50,7 @@ const char *scip_info_parameters(struct scip *s)
     if (!scip_has_head(s)) return "0A";
     const unsigned normal_rpm = rpm(scip_lines_uhz(s, "HEAD:LINES? DEF"));
     scip_reply_begin(r, s->line, s->n_line, "00");
-    scip_reply_key(r, "MODL", "%s", or_else(s->model->model, s->identity->model));
+    scip_reply_key(r, "MODL", "%s", or_else(s->model->model, s->spec.identity->model));
     scip_reply_key(r, "DMIN", "%u", (unsigned)scip_millimetres(head->range_min_m));
     scip_reply_key(r, "DMAX", "%u", (unsigned)scip_millimetres(head->range_max_m));
     scip_reply_key(r, "ARES", "%u", (unsigned)head->steps);
@@ -101,9 +101,9 @@ const char *scip_info_state(struct scip *s)
 {
     struct scip_reply *r = &s->reply;
     const struct scip_model *m = s->model;
-    const enum protocol_head_state head = protocol_ask_state(&s->host);
+    const enum protocol_head_state head = protocol_ask_state(&s->spec.host);
     scip_reply_begin(r, s->line, s->n_line, "00");
-    scip_reply_key(r, "MODL", "%s", or_else(m->model, s->identity->model));
+    scip_reply_key(r, "MODL", "%s", or_else(m->model, s->spec.identity->model));
     scip_reply_key(r, "LASR", "%s", s->laser ? "ON" : "OFF");
     put_speed(s);
     scip_reply_key(r, "MESM", "%s", mode(s, head));
@@ -120,7 +120,7 @@ const char *scip_info_state(struct scip *s)
 /* Answers %ST. MESM of a UTM-30LX-EW has the same numbers, but neither 002 (time mode) nor 005 (asleep). */
 const char *scip_info_state_number(struct scip *s)
 {
-    const enum protocol_head_state head = protocol_ask_state(&s->host);
+    const enum protocol_head_state head = protocol_ask_state(&s->spec.host);
     const char *number = "000";
     if (scip_boots(head))
         number = "001";

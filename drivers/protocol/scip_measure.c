@@ -18,11 +18,11 @@ const char *scip_laser_on(struct scip *s)
 {
     enum { LATELY_NS = 500000000 };
     const int scans = s->scan.t0_ns != INT64_MIN && native_since_ns(s->now_ns, s->scan.t0_ns) < LATELY_NS;
-    const enum protocol_head_state head = scans ? PROTOCOL_HEAD_SCANNING : protocol_ask_state(&s->host);
+    const enum protocol_head_state head = scans ? PROTOCOL_HEAD_SCANNING : protocol_ask_state(&s->spec.host);
     if (head == PROTOCOL_HEAD_FAULT) return "50";
     if (scip_boots(head)) return "10";
     if (head == PROTOCOL_HEAD_IDLE && !scan_wish_is_starting(&s->wish, &s->scan, s->now_ns)) {
-        if (s->host.command(s->host.ctx, "SCAN:START", NULL, 0) != 0) return "10";
+        if (s->spec.host.command(s->spec.host.ctx, "SCAN:START", NULL, 0) != 0) return "10";
         scan_wish_start(&s->wish, s->now_ns);
     }
     if (!s->laser) s->laser_ns = s->now_ns;
@@ -246,7 +246,7 @@ void scip_scans_came(struct scip *s, struct planar_news news)
 {
     const int streams = s->stream.active, waits = s->single.active;
     if ((streams || waits) && news.broken != 0) {
-        s->host.count(s->host.ctx, PROTOCOL_UNITS_LOST, news.broken);
+        s->spec.host.count(s->spec.host.ctx, PROTOCOL_UNITS_LOST, news.broken);
         s->stream.skipped += news.broken;
     }
     if (!news.whole) return;
@@ -255,7 +255,7 @@ void scip_scans_came(struct scip *s, struct planar_news news)
         send_scan(s, &s->single, "00");
     }
     if (streams && s->scan.whole->t0_ns >= s->stream.after_ns) {
-        scan_wish_take_turn(&s->wish, &s->scan, &s->host);
+        scan_wish_take_turn(&s->wish, &s->scan, &s->spec.host);
         stream_scan(s);
     }
 }

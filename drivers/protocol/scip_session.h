@@ -34,8 +34,7 @@ struct scip_simulation {
 };
 
 struct scip {
-    struct protocol_host host;
-    const struct protocol_identity *identity;
+    struct protocol_spec spec;
     const struct scip_model *model;
     uint32_t features; /* enum scip_feature: those of the model with this firmware */
     int64_t now_ns;

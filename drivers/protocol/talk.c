@@ -22,31 +22,28 @@ struct played {
 };
 
 struct capture_session {
-    struct protocol_host host;
-    const struct talk *talk;
-    struct talk_options options;
+    struct protocol_spec spec;
+    const struct talk *talk; /* spec.talk */
     int64_t now_ns;
     int is_begun, is_over;
     struct played played[MAX_PLAYED];
     int is_partial;               /* the bytes are not yet a whole request */
     size_t len;                   /* of bytes that the client sent, and that were not taken */
     uint8_t in[TALK_MAX_REQUEST]; /* each datagram has its length in front */
-    uint32_t times[];             /* of each request, so far */
+    uint32_t *times;              /* of each request, so far */
 };
 
-static int talk_create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
+static int capture_begin(void *protocol, struct sh_err *err)
 {
-    const size_t n = spec->talk != NULL ? spec->talk->n_requests : 0;
-    struct capture_session *s = calloc(1, sizeof *s + n * sizeof s->times[0]);
-    if (s == NULL || spec->talk == NULL) {
-        free(s);
-        return sh_fail(err, SH_ENOMEM, "protocol capture: no memory, or no capture");
-    }
-    s->host = spec->host;
-    s->talk = spec->talk;
-    s->options = *spec->talk_options;
-    *protocol = s;
-    return SH_OK;
+    struct capture_session *s = protocol;
+    s->talk = s->spec.talk;
+    s->times = s->talk != NULL ? calloc(s->talk->n_requests + 1, sizeof s->times[0]) : NULL;
+    return s->times != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "protocol capture: no memory, or no capture");
+}
+
+static void capture_end(void *protocol)
+{
+    free(((struct capture_session *)protocol)->times);
 }
 
 /* ---- runs */
@@ -94,7 +91,7 @@ static void talk_advance(const struct capture_session *s, struct played *p)
     if (++p->next < run->n) return;
     const uint32_t from = run->loop_from;
     const struct talk_message *m = &s->talk->message[run->first];
-    const int repeats = s->options.loop && from < run->n - 1;
+    const int repeats = s->spec.talk_options->loop && from < run->n - 1;
     const int64_t span_ns = repeats ? m[run->n - 1].after_ns - m[from].after_ns : 0;
     if (span_ns < LEAST_SPAN_NS) {
         p->run = NULL;
@@ -108,7 +105,7 @@ static void talk_send(const struct capture_session *s, const struct talk_message
 {
     for (uint32_t at = 0, n; at < m->len; at += n) {
         n = m->len - at < TALK_MAX_MESSAGE ? m->len - at : TALK_MAX_MESSAGE;
-        s->host.send(s->host.ctx, s->talk->bytes + m->at + at, n);
+        s->spec.host.send(s->spec.host.ctx, s->talk->bytes + m->at + at, n);
     }
 }
 
@@ -165,15 +162,15 @@ static void take_unknown(struct capture_session *s, const uint8_t *bytes, size_t
     char name[TALK_NAME_LEN], text[120];
     talk_name(kind, bytes, len, name);
     snprintf(text, sizeof text, "the capture has no such request: %s", name);
-    s->host.count(s->host.ctx, PROTOCOL_WRONG, 1);
-    if (s->host.tell_once != NULL) s->host.tell_once(s->host.ctx, text);
+    s->spec.host.count(s->spec.host.ctx, PROTOCOL_WRONG, 1);
+    if (s->spec.host.tell_once != NULL) s->spec.host.tell_once(s->spec.host.ctx, text);
     if (kind->stops != NULL) stop_others(s, bytes, len);
-    if (s->options.unknown == TALK_CLOSE) {
+    if (s->spec.talk_options->unknown == TALK_CLOSE) {
         s->is_over = 1;
-        s->host.hang_up(s->host.ctx);
+        s->spec.host.hang_up(s->spec.host.ctx);
     }
-    if (s->options.unknown == TALK_ERROR && kind->error != NULL)
-        s->host.send(s->host.ctx, error, kind->error(bytes, len, error));
+    if (s->spec.talk_options->unknown == TALK_ERROR && kind->error != NULL)
+        s->spec.host.send(s->spec.host.ctx, error, kind->error(bytes, len, error));
 }
 
 /* Finds a request where the bytes don't show where one ends (no request_len). Returns the length of the longest request
@@ -210,10 +207,10 @@ static size_t next_request(const struct capture_session *s, const uint8_t **requ
 
 static void talk_lose(struct capture_session *s, size_t len)
 {
-    s->host.count(s->host.ctx, PROTOCOL_INPUT_LOST, len);
-    if (s->host.tell_once != NULL)
-        s->host.tell_once(s->host.ctx,
-                          "bytes of a client were left out: more than 65536 of them wait, or are one request");
+    s->spec.host.count(s->spec.host.ctx, PROTOCOL_INPUT_LOST, len);
+    if (s->spec.host.tell_once != NULL)
+        s->spec.host.tell_once(s->spec.host.ctx,
+                               "bytes of a client were left out: more than 65536 of them wait, or are one request");
 }
 
 static void take_requests(struct capture_session *s)
@@ -237,7 +234,7 @@ static void take_requests(struct capture_session *s)
         s->len = 0;
     }
     if (!s->is_over) return;
-    s->host.count(s->host.ctx, PROTOCOL_INPUT_LOST, s->len);
+    s->spec.host.count(s->spec.host.ctx, PROTOCOL_INPUT_LOST, s->len);
     s->len = 0;
 }
 
@@ -301,8 +298,9 @@ const struct protocol_ops protocol_capture = {
     .name = "capture",
     .emitters = 1u << 31, /* no kind of emitter has this bit: links of heads can't have this protocol */
     .max_unit = TALK_MAX_MESSAGE,
-    .create = talk_create,
-    .destroy = free,
+    .size = sizeof(struct capture_session),
+    .begin = capture_begin,
+    .end = capture_end,
     .open = open_at,
     .time = talk_time,
     .input = talk_input,

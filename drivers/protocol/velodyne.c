@@ -2,7 +2,6 @@
 #include "drivers/protocol/velodyne.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "drivers/protocol/native.h"
@@ -28,7 +27,7 @@ enum { VELODYNE_VLP16 = 0x22, VELODYNE_HI_RES = 0x24 }; /* VLP-16 and Puck LITE;
 enum { REFL_LEAST_CDB = -2302, REFL_MOST_CDB = 3080, N_REFL = REFL_MOST_CDB - REFL_LEAST_CDB + 1 };
 
 struct velodyne {
-    struct protocol_host host;
+    struct protocol_spec spec;
     /* the head, from descriptor and emitter frames */
     uint32_t scan;
     double range_units_per_count, azimuth_per_count; /* of 2 mm, of 0.01 degree */
@@ -64,16 +63,14 @@ uint8_t velodyne_reflectivity(int refl_cdb)
     return (uint8_t)(101 + refl_cdb / 20);
 }
 
-static int velodyne_create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
+static int velodyne_begin(void *protocol, struct sh_err *err)
 {
-    struct velodyne *v = calloc(1, sizeof *v);
-    if (v == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a Velodyne session");
-    v->host = spec->host;
+    struct velodyne *v = protocol;
+    (void)err;
     for (int i = 0; i < N_REFL; i++)
         v->reflectivity[i] = velodyne_reflectivity(REFL_LEAST_CDB + i);
     for (int b = 0; b < VELODYNE_BLOCKS; b++)
         le_put16(v->packet + b * VELODYNE_BLOCK_LEN, FLAG);
-    *protocol = v;
     return SH_OK;
 }
 
@@ -82,7 +79,7 @@ static int velodyne_create(const struct protocol_spec *spec, void **protocol, st
  * the packet never came. */
 static void fall_out_of_step(struct velodyne *v)
 {
-    v->host.count(v->host.ctx, PROTOCOL_PULSES_UNSENT, v->n_firings);
+    v->spec.host.count(v->spec.host.ctx, PROTOCOL_PULSES_UNSENT, v->n_firings);
     v->n_firings = 0;
     if (v->in_step) v->is_left_over = 1;
     v->in_step = 0;
@@ -180,10 +177,10 @@ static uint32_t strongest(const uint8_t *payload, uint32_t first, uint32_t n)
 
 static void send_packet(struct velodyne *v)
 {
-    le_put32(v->packet + AT_TIME, velodyne_hour_us(&v->host, v->t0_ns));
+    le_put32(v->packet + AT_TIME, velodyne_hour_us(&v->spec.host, v->t0_ns));
     v->packet[AT_MODE] = v->mode;
     v->packet[AT_MODEL] = v->model;
-    v->host.send(v->host.ctx, v->packet, sizeof v->packet);
+    v->spec.host.send(v->spec.host.ctx, v->packet, sizeof v->packet);
     v->n_firings = 0;
 }
 
@@ -218,7 +215,7 @@ static void add_firing(struct velodyne *v, const uint8_t *payload, uint32_t firs
         const uint32_t other_lost = put_entry(v, at + VELODYNE_BLOCK_LEN, &p);
         if (n > 1) n_lost += other_lost; /* a single return is in both blocks, and counts once */
     }
-    if (n_lost != 0) v->host.count(v->host.ctx, PROTOCOL_POINTS_LOST, n_lost);
+    if (n_lost != 0) v->spec.host.count(v->spec.host.ctx, PROTOCOL_POINTS_LOST, n_lost);
     v->n_firings++;
     if (v->n_firings == (dual ? VELODYNE_PACKET_FIRINGS / 2 : VELODYNE_PACKET_FIRINGS)) send_packet(v);
 }
@@ -237,7 +234,7 @@ static void velodyne_take_points(struct velodyne *v, const uint8_t *payload, siz
     struct native_points head;
     if (native_decode_points(payload, len, &head) != SH_OK) return;
     if (v->mode == 0) {
-        v->host.count(v->host.ctx, PROTOCOL_PULSES_UNSENT, head.n_pulses);
+        v->spec.host.count(v->spec.host.ctx, PROTOCOL_PULSES_UNSENT, head.n_pulses);
         return;
     }
     if (v->in_step && head.pulse0 != v->next_pulse) fall_out_of_step(v);
@@ -253,7 +250,7 @@ static void velodyne_take_points(struct velodyne *v, const uint8_t *payload, siz
         add_firing(v, payload, i, n, frame_t_ns);
     }
     v->next_pulse = pulse;
-    v->host.count(v->host.ctx, PROTOCOL_PULSES_UNSENT, unsent);
+    v->spec.host.count(v->spec.host.ctx, PROTOCOL_PULSES_UNSENT, unsent);
 }
 
 static void velodyne_take_event(struct velodyne *v, const uint8_t *payload, size_t len)
@@ -280,7 +277,7 @@ static void velodyne_take_gap(void *protocol, uint32_t n_frames)
 {
     struct velodyne *v = protocol;
     (void)n_frames;
-    if (v->n_firings != 0) v->host.count(v->host.ctx, PROTOCOL_UNITS_LOST, 1);
+    if (v->n_firings != 0) v->spec.host.count(v->spec.host.ctx, PROTOCOL_UNITS_LOST, 1);
     v->n_firings = 0;
     fall_out_of_step(v);
     v->is_left_over = 0; /* the loss of the gap includes the other pulses of this firing sequence */
@@ -309,18 +306,6 @@ static int check_head(const struct native_descriptor *d, const struct native_emi
     return SH_OK;
 }
 
-static void nothing_at(void *protocol, int64_t t_ns)
-{
-    (void)protocol;
-    (void)t_ns;
-}
-
-static int64_t never(const void *protocol)
-{
-    (void)protocol;
-    return INT64_MAX;
-}
-
 /* Marks the bytes of ranges and reflectivities. */
 static void mark_entries(const uint8_t *packet, size_t len, uint8_t *mask)
 {
@@ -337,12 +322,9 @@ const struct protocol_ops protocol_velodyne = {
     .max_unit = VELODYNE_DATA_LEN,
     .content = mark_entries,
     .check_head = check_head,
-    .create = velodyne_create,
-    .destroy = free,
-    .open = nothing_at,
+    .size = sizeof(struct velodyne),
+    .begin = velodyne_begin,
     .frame = velodyne_take_frame,
     .gap = velodyne_take_gap,
-    .time = nothing_at,
     .input = protocol_lose_input,
-    .next_ns = never,
 };

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "drivers/protocol/http_request.h"
@@ -22,15 +21,6 @@ struct server {
     struct http_reader reader;
     char body[MAX_BODY], answer[MAX_ANSWER];
 };
-
-static int velodyne_http_create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
-{
-    struct server *s = calloc(1, sizeof *s);
-    if (s == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a session of Velodyne settings");
-    s->spec = *spec;
-    *protocol = s;
-    return SH_OK;
-}
 
 static const struct status {
     int number;
@@ -190,8 +180,7 @@ const struct protocol_ops protocol_velodyne_http = {
     .n_beams = VELODYNE_BEAMS,
     .max_unit = MAX_ANSWER,
     .brief = 1,
-    .create = velodyne_http_create,
-    .destroy = free,
+    .size = sizeof(struct server),
     .open = open_at,
     .time = at_time,
     .input = velodyne_http_input,

@@ -1,5 +1,4 @@
 /* SPDX-License-Identifier: MIT */
-#include <stdlib.h>
 #include <string.h>
 
 #include "core/bytes.h"
@@ -32,20 +31,9 @@ enum { TOP_DEGC = 42, BOTTOM_DEGC = 39, ADC_DEGC = 40, POWER_UP_DEGC = 25 };
 enum { MOST_AT_ONCE = 64 };
 
 struct position {
-    struct protocol_host host;
-    int64_t power_ns; /* device time of power-up; it counts as the last ADC calibration */
-    int64_t next_ns;  /* device time of the next packet */
+    struct protocol_spec spec; /* its power-up counts as the last ADC calibration */
+    int64_t next_ns;           /* device time of the next packet */
 };
-
-static int velodyne_position_create(const struct protocol_spec *spec, void **protocol, struct sh_err *err)
-{
-    struct position *p = calloc(1, sizeof *p);
-    if (p == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a session of Velodyne position packets");
-    p->host = spec->host;
-    p->power_ns = spec->power_ns;
-    *protocol = p;
-    return SH_OK;
-}
 
 /* Times are multiples of the period, so that sessions agree. */
 static void open_at(void *protocol, int64_t t_ns)
@@ -59,7 +47,7 @@ static void put_sentence(const struct position *p, char *dst, int64_t t_ns)
 {
     char sentence[NMEA_MAX_SENTENCE];
     struct nmea_fix fix;
-    if (!p->host.fix(p->host.ctx, t_ns, &fix)) return;
+    if (!p->spec.host.fix(p->spec.host.ctx, t_ns, &fix)) return;
     memcpy(fix.talker, "GP", 2);
     memcpy(dst, sentence, nmea_encode_rmc(sentence, sizeof sentence, &fix));
 }
@@ -71,13 +59,13 @@ static void send_packet(const struct position *p, int64_t t_ns)
     packet[AT_BOTTOM] = BOTTOM_DEGC;
     packet[AT_ADC] = ADC_DEGC;
     le_put16(packet + AT_CHANGE, TOP_DEGC - ADC_DEGC);
-    le_put32(packet + AT_CALIBRATED_S, (uint32_t)((t_ns - p->power_ns) / 1000000000));
+    le_put32(packet + AT_CALIBRATED_S, (uint32_t)((t_ns - p->spec.power_ns) / 1000000000));
     packet[AT_REASON] = REASON_POWER_ON;
-    le_put32(packet + AT_TIME, velodyne_hour_us(&p->host, t_ns));
-    packet[AT_PPS] = (uint8_t)velodyne_pps(&p->host, t_ns);
+    le_put32(packet + AT_TIME, velodyne_hour_us(&p->spec.host, t_ns));
+    packet[AT_PPS] = (uint8_t)velodyne_pps(&p->spec.host, t_ns);
     packet[AT_POWER_UP] = POWER_UP_DEGC;
     put_sentence(p, (char *)packet + AT_NMEA, t_ns);
-    p->host.send(p->host.ctx, packet, sizeof packet);
+    p->spec.host.send(p->spec.host.ctx, packet, sizeof packet);
 }
 
 /* After a long silence of the head only the newest are sent. */
@@ -87,7 +75,7 @@ static void at_time(void *protocol, int64_t t_ns)
     if (t_ns <= p->next_ns) return;
     const int64_t due = (t_ns - p->next_ns + VELODYNE_POSITION_NS - 1) / VELODYNE_POSITION_NS;
     if (due > MOST_AT_ONCE) {
-        p->host.count(p->host.ctx, PROTOCOL_UNITS_LOST, (uint64_t)(due - MOST_AT_ONCE));
+        p->spec.host.count(p->spec.host.ctx, PROTOCOL_UNITS_LOST, (uint64_t)(due - MOST_AT_ONCE));
         p->next_ns += (due - MOST_AT_ONCE) * VELODYNE_POSITION_NS;
     }
     for (; p->next_ns < t_ns; p->next_ns += VELODYNE_POSITION_NS)
@@ -106,8 +94,7 @@ const struct protocol_ops protocol_velodyne_position = {
     .max_unit = VELODYNE_POSITION_LEN,
     .content = nmea_content,
     .reseal = nmea_reseal,
-    .create = velodyne_position_create,
-    .destroy = free,
+    .size = sizeof(struct position),
     .open = open_at,
     .time = at_time,
     .input = protocol_lose_input,

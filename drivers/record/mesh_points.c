@@ -7,30 +7,28 @@
 #include "core/grow.h"
 #include "core/studio/mesh.h"
 
+/* Does something with each array, but for `frame`, which not all recordings have. */
+#define ARRAYS(DO)  DO(xyz_m) DO(normal) DO(rgb) DO(uv) DO(range_m) DO(reflectance_db) DO(label) DO(station)
+#define GROW(array) has_grown = has_grown && resize(&p->array, n, sizeof *p->array);
+#define PUT(array)  memcpy(&p->array[i], &point->array, sizeof point->array);
+#define GET(array)  memcpy(&point->array, &p->array[i], sizeof point->array);
+#define FREE(array) free(p->array);
+
 static int grow_all(struct mesh_points *p, struct sh_err *err)
 {
     const size_t n = p->room + p->room / 2 + 4096;
-    if (resize(&p->xyz_m, n, sizeof *p->xyz_m) && resize(&p->normal, n, sizeof *p->normal) &&
-        resize(&p->rgb, n, sizeof *p->rgb) && resize(&p->uv, n, sizeof *p->uv) &&
-        resize(&p->range_m, n, sizeof *p->range_m) && resize(&p->reflectance_db, n, sizeof *p->reflectance_db) &&
-        resize(&p->label, n, sizeof *p->label) && resize(&p->station, n, sizeof *p->station) &&
-        (!p->has_frame || resize(&p->frame, n, sizeof *p->frame))) {
-        p->room = n;
-        return SH_OK;
-    }
-    return sh_fail(err, SH_ENOMEM, "no memory for more than %u points; a mesh keeps all its points in memory", p->n);
+    int has_grown = !p->has_frame || resize(&p->frame, n, sizeof *p->frame);
+    ARRAYS(GROW)
+    if (!has_grown)
+        return sh_fail(err, SH_ENOMEM, "no memory for more than %u points; a mesh keeps all its points in memory",
+                       p->n);
+    p->room = n;
+    return SH_OK;
 }
 
 static void mesh_points_put(struct mesh_points *p, uint32_t i, const struct mesh_point *point)
 {
-    memcpy(p->xyz_m[i], point->xyz_m, sizeof point->xyz_m);
-    memcpy(p->normal[i], point->normal, sizeof point->normal);
-    memcpy(p->rgb[i], point->rgb, sizeof point->rgb);
-    memcpy(p->uv[i], point->uv, sizeof point->uv);
-    p->range_m[i] = point->range_m;
-    p->reflectance_db[i] = point->reflectance_db;
-    p->label[i] = point->label;
-    p->station[i] = point->station;
+    ARRAYS(PUT)
     if (p->has_frame) p->frame[i] = point->frame;
 }
 
@@ -46,14 +44,7 @@ int mesh_points_add(struct mesh_points *p, const struct mesh_point *point, struc
 
 void mesh_points_get(const struct mesh_points *p, uint32_t i, struct mesh_point *point)
 {
-    memcpy(point->xyz_m, p->xyz_m[i], sizeof point->xyz_m);
-    memcpy(point->normal, p->normal[i], sizeof point->normal);
-    memcpy(point->rgb, p->rgb[i], sizeof point->rgb);
-    memcpy(point->uv, p->uv[i], sizeof point->uv);
-    point->range_m = p->range_m[i];
-    point->reflectance_db = p->reflectance_db[i];
-    point->label = p->label[i];
-    point->station = p->station[i];
+    ARRAYS(GET)
     point->frame = p->has_frame ? p->frame[i] : 0;
 }
 
@@ -67,8 +58,7 @@ void mesh_points_move(struct mesh_points *p, uint32_t from, uint32_t to)
 
 void mesh_points_free(struct mesh_points *p)
 {
-    void *all[] = {p->xyz_m, p->normal, p->rgb, p->uv, p->range_m, p->reflectance_db, p->label, p->station, p->frame};
-    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++)
-        free(all[i]);
+    ARRAYS(FREE)
+    free(p->frame);
     memset(p, 0, sizeof *p);
 }

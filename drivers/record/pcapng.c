@@ -50,28 +50,11 @@ static void count_packet(struct packets *p, const struct pcapng_packet *packet)
         scan_count_frame(&p->scans, packet->data);
 }
 
-/* A repair ends the file with a note that data may be missing. The note is a block of statistics of the first
- * interface, with a comment and without figures. */
-enum { BLOCK_STATISTICS = 5, OPTION_COMMENT = 1, NOTE_HEAD = 20 };
-static const char NOTE[] = REPAIR_INCOMPLETE;
-enum { NOTE_TEXT = sizeof NOTE - 1, NOTE_LEN = NOTE_HEAD + 4 + (NOTE_TEXT + 3) / 4 * 4 + 4 + 4 };
-
-static void put_note(uint8_t note[NOTE_LEN])
-{
-    memset(note, 0, NOTE_LEN);
-    le_put32(note, BLOCK_STATISTICS);
-    le_put32(note + 4, NOTE_LEN);
-    le_put16(note + NOTE_HEAD, OPTION_COMMENT);
-    le_put16(note + NOTE_HEAD + 2, NOTE_TEXT);
-    memcpy(note + NOTE_HEAD + 4, NOTE, NOTE_TEXT);
-    le_put32(note + NOTE_LEN - 4, NOTE_LEN);
-}
-
+/* A repair ends the file with a note that data may be missing. */
 static int is_note(const uint8_t *block, size_t len)
 {
-    uint8_t note[NOTE_LEN];
-    put_note(note);
-    return len == NOTE_LEN && memcmp(block, note, NOTE_LEN) == 0;
+    uint8_t note[PCAPNG_FRONT_ROOM];
+    return len == pcapng_put_note(note, REPAIR_INCOMPLETE) && memcmp(block, note, len) == 0;
 }
 
 static int is_own_section(const uint8_t *block, size_t len)
@@ -152,9 +135,8 @@ static int pcapng_repair(struct repair *r, struct sh_err *err)
         rc = r->was_whole || p->is_ours ? repair_cut(r, end, err) : repair_fail_foreign(r, err);
     }
     if (rc == SH_OK && !r->was_whole && !p->is_noted) {
-        uint8_t note[NOTE_LEN];
-        put_note(note);
-        repair_append_note(r, end, note, NOTE_LEN);
+        uint8_t note[PCAPNG_FRONT_ROOM];
+        repair_append_note(r, end, note, pcapng_put_note(note, REPAIR_INCOMPLETE));
     }
     free(p);
     return rc;

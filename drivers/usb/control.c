@@ -31,7 +31,7 @@ static struct usb_pipe *named_pipe(struct usb_device *device, const struct setup
 
 static int names_interface(const struct usb_device *device, const struct setup *s)
 {
-    return device->state == USB_CONFIGURED && s->index < device->model->n_interfaces;
+    return device->state == USB_CONFIGURED && s->index < device->facts.model->n_interfaces;
 }
 
 /* ---- device */
@@ -39,7 +39,7 @@ static int names_interface(const struct usb_device *device, const struct setup *
 static int get_device_status(struct usb_device *device, const struct setup *s, uint8_t *data)
 {
     if (device->state == USB_DEFAULT || s->value != 0 || s->index != 0 || s->length != 2) return USB_STALL;
-    unsigned status = (unsigned)usb_is_self_powered(device->model);
+    unsigned status = (unsigned)usb_is_self_powered(device->facts.model);
     status |= (unsigned)device->u1_enabled << USB_DEV_STAT_U1_ENABLED;
     status |= (unsigned)device->u2_enabled << USB_DEV_STAT_U2_ENABLED;
     return put_status(data, status);
@@ -48,7 +48,7 @@ static int get_device_status(struct usb_device *device, const struct setup *s, u
 static int device_feature(struct usb_device *device, const struct setup *s, uint8_t *data)
 {
     (void)data;
-    const int super = device->rate == USB_RATE_SUPER && device->state == USB_CONFIGURED;
+    const int super = device->facts.rate == USB_RATE_SUPER && device->state == USB_CONFIGURED;
     if (s->length != 0 || s->index != 0 || !super) return USB_STALL;
     if (s->value != USB_DEVICE_U1_ENABLE && s->value != USB_DEVICE_U2_ENABLE) return USB_STALL;
     *(s->value == USB_DEVICE_U1_ENABLE ? &device->u1_enabled : &device->u2_enabled) = s->request == USB_REQ_SET_FEATURE;
@@ -72,8 +72,8 @@ static size_t lengthen(const struct usb_device *device, uint8_t *out, size_t roo
 
 static size_t control_describe(const struct usb_device *device, const struct setup *s, uint8_t *out)
 {
-    const struct usb_model *model = device->model;
-    const struct usb_identity *id = &device->id;
+    const struct usb_model *model = device->facts.model;
+    const struct usb_identity *id = &device->facts.id;
     const uint8_t type = (uint8_t)(s->value >> 8), index = (uint8_t)s->value;
     const size_t room = s->length;
     if (type == USB_DT_STRING)
@@ -81,12 +81,12 @@ static size_t control_describe(const struct usb_device *device, const struct set
     if (index != 0 || s->index != 0) return 0;
     switch (type) {
     case USB_DT_DEVICE:
-        return usb_describe_device(model, id, device->rate, out, room);
+        return usb_describe_device(model, id, device->facts.rate, out, room);
     case USB_DT_CONFIG:
     case USB_DT_OTHER_SPEED_CONFIG:
-        return lengthen(device, out, room, usb_describe_config(model, id, device->rate, type, out, room));
+        return lengthen(device, out, room, usb_describe_config(model, id, device->facts.rate, type, out, room));
     case USB_DT_DEVICE_QUALIFIER:
-        return usb_describe_qualifier(model, id, device->rate, out, room);
+        return usb_describe_qualifier(model, id, device->facts.rate, out, room);
     case USB_DT_BOS:
         return usb_describe_bos(model, id, out, room);
     default:
@@ -120,14 +120,14 @@ static int set_configuration(struct usb_device *device, const struct setup *s, u
 static int set_sel(struct usb_device *device, const struct setup *s, uint8_t *data)
 {
     (void)data; /* exit latencies of the path; nothing here depends on them */
-    const int allowed = device->rate == USB_RATE_SUPER && device->state != USB_DEFAULT;
+    const int allowed = device->facts.rate == USB_RATE_SUPER && device->state != USB_DEFAULT;
     return allowed && s->value == 0 && s->index == 0 && s->length == 6 ? 0 : USB_STALL;
 }
 
 static int set_isoch_delay(struct usb_device *device, const struct setup *s, uint8_t *data)
 {
     (void)data;
-    return device->rate == USB_RATE_SUPER && s->index == 0 && s->length == 0 ? 0 : USB_STALL;
+    return device->facts.rate == USB_RATE_SUPER && s->index == 0 && s->length == 0 ? 0 : USB_STALL;
 }
 
 /* ---- interface */
@@ -144,10 +144,10 @@ static int set_interface_feature(struct usb_device *device, const struct setup *
 {
     (void)data;
     const unsigned interface = s->index & 0xff, options = s->index >> 8;
-    if (device->rate != USB_RATE_SUPER || device->state != USB_CONFIGURED || s->length != 0) return USB_STALL;
+    if (device->facts.rate != USB_RATE_SUPER || device->state != USB_CONFIGURED || s->length != 0) return USB_STALL;
     if (s->value != USB_INTRF_FUNC_SUSPEND || (options & ~1u) != 0) return USB_STALL; /* bit 0: low power */
-    for (unsigned i = 0; i < device->model->n_functions; i++)
-        if (device->model->function[i].first == interface) return 0;
+    for (unsigned i = 0; i < device->facts.model->n_functions; i++)
+        if (device->facts.model->function[i].first == interface) return 0;
     return USB_STALL;
 }
 
@@ -221,7 +221,7 @@ static int standard(struct usb_device *device, const struct setup *s, uint8_t *d
 
 static int get_ms_os(const struct usb_device *device, const struct setup *s, uint8_t *data)
 {
-    const size_t len = usb_describe_ms_os(device->model, data, s->length);
+    const size_t len = usb_describe_ms_os(device->facts.model, data, s->length);
     if (s->value != 0) return USB_STALL;
     return (int)(len < s->length ? len : s->length);
 }
@@ -231,8 +231,9 @@ static int class_or_vendor(struct usb_device *device, const struct usb_ctrlreque
                            uint8_t *data)
 {
     enum { MS_OS_20_DESCRIPTOR_INDEX = 7 };
-    if (s->type == (USB_DIR_IN | USB_TYPE_VENDOR | USB_RECIP_DEVICE) && s->request == device->model->ms_vendor_code &&
-        s->index == MS_OS_20_DESCRIPTOR_INDEX && usb_describe_ms_os(device->model, NULL, 0) != 0)
+    if (s->type == (USB_DIR_IN | USB_TYPE_VENDOR | USB_RECIP_DEVICE) &&
+        s->request == device->facts.model->ms_vendor_code && s->index == MS_OS_20_DESCRIPTOR_INDEX &&
+        usb_describe_ms_os(device->facts.model, NULL, 0) != 0)
         return get_ms_os(device, s, data);
     const struct setup low = {.index = s->index & 0xff};
     if ((s->type & USB_RECIP_MASK) == USB_RECIP_INTERFACE && !names_interface(device, &low)) return USB_STALL;

@@ -34,7 +34,7 @@ static int open_ep0(struct functionfs *self, struct sh_err *err)
     snprintf(path, sizeof path, "%s/ep0", self->gadget.mount);
     self->ep0 = open(path, O_RDWR | O_NONBLOCK | O_CLOEXEC);
     if (self->ep0 < 0) return sh_fail(err, SH_EIO, "functionfs: %s: %s", path, strerror(errno));
-    return gadget_describe(&self->gadget, self->ep0, usb_device_identity(self->device), err);
+    return gadget_describe(&self->gadget, self->ep0, &usb_facts(self->device)->id, err);
 }
 
 static void take_apart(struct functionfs *self)
@@ -55,12 +55,12 @@ static int functionfs_open(const struct usb_backend_spec *spec, struct usb_devic
     if (self == NULL) return sh_fail(err, SH_ENOMEM, "functionfs: no memory");
     self->device = device;
     self->ep0 = self->pipes.event_fd = self->console.fd = self->console.timer = -1;
-    int rc = gadget_create(&self->gadget, usb_device_model(device), usb_device_identity(device), err);
+    int rc = gadget_create(&self->gadget, usb_facts(device)->model, &usb_facts(device)->id, err);
     if (rc == SH_OK && gadget_has_functionfs(&self->gadget)) rc = open_ep0(self, err);
     if (rc == SH_OK) rc = ffs_pipes_open(&self->pipes, device, &self->gadget, err);
     if (rc == SH_OK) rc = ffs_console_open(&self->console, device, self->gadget.tty_number, err);
     if (rc == SH_OK) rc = gadget_bind(&self->gadget, spec->udc, err);
-    if (rc == SH_OK) rc = gadget_check_rate(&self->gadget, usb_device_identity(device)->highest, err);
+    if (rc == SH_OK) rc = gadget_check_rate(&self->gadget, usb_facts(device)->id.highest, err);
     if (rc == SH_OK && self->ep0 < 0) rc = gadget_watch_state(&self->gadget, err);
     if (rc != SH_OK) {
         take_apart(self);
@@ -107,7 +107,7 @@ static void look_at_addresses(struct functionfs *self)
 {
     char text[200];
     uint8_t given = 0;
-    if (!usb_device_model(self->device)->fixed_addresses || self->has_said_moved) return;
+    if (!usb_facts(self->device)->model->fixed_addresses || self->has_said_moved) return;
     const uint8_t wanted = ffs_pipes_moved(&self->pipes, &given);
     if (wanted == 0) return;
     snprintf(
@@ -179,7 +179,7 @@ static void take_state(struct functionfs *self, int hung_up)
     /* Reading lets poll(2) wait for the next change. The reading comes first, so that no change between both reads is
      * missed. */
     if (pread(self->gadget.state_fd, text, sizeof text, 0) < 0) return;
-    const int was = usb_device_configuration(self->device) != 0;
+    const int was = usb_facts(self->device)->configuration != 0;
     const int is = gadget_is_configured(&self->gadget, was);
     if (was && (hung_up || !is)) functionfs_disable(self, !gadget_is_on_bus(&self->gadget));
     if (is && (hung_up || !was)) functionfs_enable(self);

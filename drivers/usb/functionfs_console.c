@@ -150,7 +150,7 @@ static void read_rx(struct ffs_console *console)
     if (n <= 0) return;
     if (!console->session) {
         set_session(console, 1);
-        if (console->cut && usb_device_model(console->device) == &scanhead_usb_model) lead_in(console);
+        if (console->cut && usb_facts(console->device)->model == &scanhead_usb_model) lead_in(console);
     }
     console->rx_busy = 1;
     console->rx =

@@ -116,7 +116,7 @@ static void on_interface(void *ctx, unsigned interface, int active)
         if (active) continue;
         if (session->open) {
             head->cut_due = 1;
-            head->cut = usb_device_end(head->device);
+            head->cut = usb_facts(head->device)->end;
         }
         set_open(head, i, 0);
     }

@@ -103,16 +103,16 @@ int usb_device_cancel(struct usb_device *device, uint64_t id);
 
 /* ---- for both */
 
-const struct usb_model *usb_device_model(const struct usb_device *device);
-const struct usb_identity *usb_device_identity(const struct usb_device *device);
-enum usb_rate usb_device_rate(const struct usb_device *device);
-/* Returns why interfaces ended last, or are ending. */
-enum usb_end usb_device_end(const struct usb_device *device);
-/* Returns USB_CONFIGURATION, or 0 if the device is not configured. */
-int usb_device_configuration(const struct usb_device *device);
-
-/* Returns how often the device was attached. */
-uint32_t usb_device_attaches(const struct usb_device *device);
+struct usb_facts {
+    const struct usb_model *model;
+    struct usb_identity id;
+    enum usb_rate rate;
+    enum usb_end end;  /* why interfaces ended last, or are ending */
+    int configuration; /* USB_CONFIGURATION, or 0 if the device is not configured */
+    uint32_t attaches; /* how often the device was attached */
+};
+/* Valid, and kept up to date, as long as the device lives. */
+const struct usb_facts *usb_facts(const struct usb_device *device);
 
 /* ---- injected faults */
 

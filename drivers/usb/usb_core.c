@@ -59,7 +59,7 @@ static void stop_pipe(struct usb_device *device, struct usb_pipe *pipe)
 
 static void set_interface(struct usb_device *device, unsigned interface, int active)
 {
-    const struct usb_interface_row *row = &device->model->interface[interface];
+    const struct usb_interface_row *row = &device->facts.model->interface[interface];
     for (unsigned i = 0; i < row->n_endpoints; i++) {
         struct usb_pipe *pipe = usb_pipe(device, row->endpoint[i].address);
         if (active)
@@ -72,10 +72,11 @@ static void set_interface(struct usb_device *device, unsigned interface, int act
 
 void usb_enter(struct usb_device *device, enum usb_state state, enum usb_end why)
 {
-    const int n = device->model->n_interfaces;
+    const int n = device->facts.model->n_interfaces;
     enum usb_state before = device->state;
     device->state = state;
-    device->end = why; /* before interfaces end: their hook asks for it */
+    device->facts.configuration = state == USB_CONFIGURED ? USB_CONFIGURATION : 0;
+    device->facts.end = why; /* before interfaces end: their hook asks for it */
     for (int i = 0; i < n && before == USB_CONFIGURED; i++)
         set_interface(device, (unsigned)i, 0);
     if (state != USB_CONFIGURED) device->u1_enabled = device->u2_enabled = 0;
@@ -85,7 +86,7 @@ void usb_enter(struct usb_device *device, enum usb_state state, enum usb_end why
 
 void usb_restart_interface(struct usb_device *device, unsigned interface)
 {
-    device->end = USB_END_CONFIGURED;
+    device->facts.end = USB_END_CONFIGURED;
     set_interface(device, interface, 0);
     set_interface(device, interface, 1);
 }
@@ -104,10 +105,10 @@ void usb_device_attach(struct usb_device *device, enum usb_rate rate, usb_comple
     usb_device_detach(device);
     device->complete = complete;
     device->host_ctx = ctx;
-    device->rate = rate;
+    device->facts.rate = rate;
     device->suspended = 0;
     device->state = USB_DEFAULT;
-    device->attaches++;
+    device->facts.attaches++;
 }
 
 void usb_device_detach(struct usb_device *device)
@@ -216,7 +217,7 @@ size_t usb_device_write(struct usb_device *device, uint8_t endpoint, const void 
     const uint8_t *at = data;
     size_t left = len;
     while (left > 0 && usb_device_can_write(device, endpoint)) {
-        const uint32_t packet = pipe->row->packet[device->rate];
+        const uint32_t packet = pipe->row->packet[device->facts.rate];
         enum usb_status status;
         uint32_t n = fill_transfer(pipe, packet, at, left, &status);
         at += n;
@@ -317,8 +318,8 @@ int usb_device_create(const struct usb_model *model, const struct usb_identity *
     if (rc != SH_OK) return rc;
     struct usb_device *device = calloc(1, sizeof *device);
     if (device == NULL) return sh_fail(err, SH_ENOMEM, "usb: no memory");
-    device->model = model;
-    device->id = *id;
+    device->facts.model = model;
+    device->facts.id = *id;
     device->hooks = *hooks;
     device->ctx = ctx;
     *out = device;
@@ -332,32 +333,7 @@ void usb_device_free(struct usb_device *device)
     free(device);
 }
 
-const struct usb_model *usb_device_model(const struct usb_device *device)
+const struct usb_facts *usb_facts(const struct usb_device *device)
 {
-    return device->model;
-}
-
-const struct usb_identity *usb_device_identity(const struct usb_device *device)
-{
-    return &device->id;
-}
-
-uint32_t usb_device_attaches(const struct usb_device *device)
-{
-    return device->attaches;
-}
-
-enum usb_rate usb_device_rate(const struct usb_device *device)
-{
-    return device->rate;
-}
-
-enum usb_end usb_device_end(const struct usb_device *device)
-{
-    return device->end;
-}
-
-int usb_device_configuration(const struct usb_device *device)
-{
-    return device->state == USB_CONFIGURED ? USB_CONFIGURATION : 0;
+    return &device->facts;
 }

@@ -19,18 +19,14 @@ struct usb_pipe {
 };
 
 struct usb_device {
-    const struct usb_model *model;
-    struct usb_identity id;
+    struct usb_facts facts;
     struct usb_hooks hooks;
     void *ctx;
     usb_complete complete;
     void *host_ctx;
     enum usb_state state;
-    enum usb_rate rate;
-    enum usb_end end; /* why interfaces ended last */
     int suspended;
     int u1_enabled, u2_enabled;
-    uint32_t attaches;
     double slow_ms;           /* how long a control request takes */
     uint32_t lengthen;        /* bytes that the configuration claims and doesn't have */
     struct usb_pipe pipe[32]; /* 0..15 OUT, 16..31 IN; the two of endpoint 0 stay empty */

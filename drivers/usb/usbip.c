@@ -44,8 +44,7 @@ static int attach_here(struct usbip *self, struct sh_err *err)
     if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair) != 0)
         return sh_fail(err, SH_EIO, "usbip: no socket pair: %s", strerror(errno));
     setsockopt(pair[0], SOL_SOCKET, SO_SNDBUF, &size, sizeof size);
-    int rc =
-        vhci_attach(NULL, pair[1], usbip_devid(self->device), usb_device_identity(self->device)->highest, &port, err);
+    int rc = vhci_attach(NULL, pair[1], usbip_devid(self->device), usb_facts(self->device)->id.highest, &port, err);
     close(pair[1]);
     if (rc == SH_OK && fcntl(pair[0], F_SETFL, O_NONBLOCK) != 0)
         rc = sh_fail(err, SH_EIO, "usbip: socket pair: %s", strerror(errno));

@@ -55,7 +55,7 @@ static void on_complete(void *ctx, struct usb_transfer *transfer)
 void usbip_conn_import(struct usbip_conn *conn)
 {
     conn->imported = *conn->taken = 1;
-    usb_device_attach(conn->device, usb_device_identity(conn->device)->highest, on_complete, conn);
+    usb_device_attach(conn->device, usb_facts(conn->device)->id.highest, on_complete, conn);
     usb_device_assume_address(conn->device); /* the client's kernel does not send SET_ADDRESS on */
 }
 

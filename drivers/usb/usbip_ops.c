@@ -7,7 +7,7 @@
 /* The port of this head on the server's side: 1 unless it has a number of its own. */
 static unsigned port_of(const struct usb_device *device)
 {
-    const unsigned number = usb_device_identity(device)->number;
+    const unsigned number = usb_facts(device)->id.number;
     return number != 0 ? number : 1;
 }
 
@@ -25,8 +25,8 @@ static void describe_device(const struct usbip_conn *conn, uint8_t *out)
 {
     static const uint8_t speed[] = {
         [USB_RATE_FULL] = USB_SPEED_FULL, [USB_RATE_HIGH] = USB_SPEED_HIGH, [USB_RATE_SUPER] = USB_SPEED_SUPER};
-    const struct usb_model *model = usb_device_model(conn->device);
-    const struct usb_identity *id = usb_device_identity(conn->device);
+    const struct usb_model *model = usb_facts(conn->device)->model;
+    const struct usb_identity *id = &usb_facts(conn->device)->id;
     char bus_id[BUSID_LEN];
     memset(out, 0, OP_DEVICE);
     put_bus_id(conn->device, bus_id, sizeof bus_id);
@@ -41,7 +41,7 @@ static void describe_device(const struct usbip_conn *conn, uint8_t *out)
     out[306] = model->class;
     out[307] = model->subclass;
     out[308] = model->protocol;
-    out[309] = (uint8_t)usb_device_configuration(conn->device);
+    out[309] = (uint8_t)usb_facts(conn->device)->configuration;
     out[310] = 1;
     out[311] = model->n_interfaces;
 }
@@ -55,7 +55,7 @@ static void put_op(uint8_t *out, unsigned code, uint32_t status)
 
 static void list_devices(struct usbip_conn *conn)
 {
-    const struct usb_model *model = usb_device_model(conn->device);
+    const struct usb_model *model = usb_facts(conn->device)->model;
     uint8_t *out = usbip_queue_plain(conn, OP_HEADER + 4 + OP_DEVICE + (uint32_t)model->n_interfaces * OP_INTERFACE);
     if (out == NULL) return;
     put_op(out, OP_REP_DEVLIST, OP_OK);

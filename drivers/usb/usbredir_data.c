@@ -100,8 +100,8 @@ void usbredir_on_complete(void *ctx, struct usb_transfer *t)
 /* The endpoint's descriptor; NULL: there is none in the present configuration. */
 static const struct usb_endpoint_row *find_endpoint(const struct usbredir *self, unsigned address)
 {
-    const struct usb_model *model = usb_device_model(self->device);
-    for (unsigned i = 0; i < model->n_interfaces && usb_device_configuration(self->device) != 0; i++)
+    const struct usb_model *model = usb_facts(self->device)->model;
+    for (unsigned i = 0; i < model->n_interfaces && usb_facts(self->device)->configuration != 0; i++)
         for (unsigned k = 0; k < model->interface[i].n_endpoints; k++)
             if (model->interface[i].endpoint[k].address == address) return &model->interface[i].endpoint[k];
     return NULL;
@@ -171,7 +171,7 @@ static void on_start_interrupt(void *priv, uint64_t id, struct usb_redir_start_i
         .id = OWN_ID | number,
         .endpoint = start->endpoint,
         .length =
-            row->packet[usb_device_rate(self->device)], /* one packet at a time, as the guest's controller takes them */
+            row->packet[usb_facts(self->device)->rate], /* one packet at a time, as the guest's controller takes them */
         .data = transfer->bytes};
     self->receiving[number] = transfer;
     usb_device_submit(self->device, &transfer->transfer);

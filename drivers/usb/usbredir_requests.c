@@ -14,7 +14,7 @@
 
 static void send_interfaces(struct usbredir *self)
 {
-    const struct usb_model *model = usb_device_model(self->device);
+    const struct usb_model *model = usb_facts(self->device)->model;
     struct usb_redir_interface_info_header info = {.interface_count = model->n_interfaces};
     struct usb_redir_ep_info_header eps = {0};
     memset(eps.type, usb_redir_type_invalid, sizeof eps.type);
@@ -29,9 +29,9 @@ static void send_interfaces(struct usbredir *self)
             const struct usb_endpoint_row *ep = &row->endpoint[k];
             const unsigned at = usb_endpoint_index(ep->address);
             eps.type[at] = ep->type;
-            eps.interval[at] = ep->interval[usb_device_rate(self->device)];
+            eps.interval[at] = ep->interval[usb_facts(self->device)->rate];
             eps.interface[at] = row->number;
-            eps.max_packet_size[at] = ep->packet[usb_device_rate(self->device)];
+            eps.max_packet_size[at] = ep->packet[usb_facts(self->device)->rate];
         }
     }
     usbredirparser_send_interface_info(self->parser, &info);
@@ -43,8 +43,8 @@ void usbredir_plug(struct usbredir *self)
     static const uint8_t speed[] = {[USB_RATE_FULL] = usb_redir_speed_full,
                                     [USB_RATE_HIGH] = usb_redir_speed_high,
                                     [USB_RATE_SUPER] = usb_redir_speed_super};
-    const struct usb_model *model = usb_device_model(self->device);
-    const struct usb_identity *id = usb_device_identity(self->device);
+    const struct usb_model *model = usb_facts(self->device)->model;
+    const struct usb_identity *id = &usb_facts(self->device)->id;
     usb_device_attach(self->device, id->highest, usbredir_on_complete, self);
     usb_device_assume_address(self->device); /* the guest's controller does not send SET_ADDRESS on */
     send_interfaces(self);
@@ -97,14 +97,14 @@ static void set_configuration(struct usbredir *self, uint64_t id, const struct u
     if (rc == 0) send_interfaces(self);
     struct usb_redir_configuration_status_header status = {.status = rc == 0 ? usb_redir_success : usb_redir_stall,
                                                            .configuration =
-                                                               (uint8_t)usb_device_configuration(self->device)};
+                                                               (uint8_t)usb_facts(self->device)->configuration};
     usbredirparser_send_configuration_status(self->parser, id, &status);
 }
 
 static void send_alt(struct usbredir *self, uint64_t id, unsigned interface, int ok)
 {
     const int is_there =
-        usb_device_configuration(self->device) != 0 && interface < usb_device_model(self->device)->n_interfaces;
+        usb_facts(self->device)->configuration != 0 && interface < usb_facts(self->device)->model->n_interfaces;
     struct usb_redir_alt_setting_status_header status = {.status = ok && is_there ? usb_redir_success : usb_redir_stall,
                                                          .interface = (uint8_t)interface};
     usbredirparser_send_alt_setting_status(self->parser, id, &status);
@@ -234,7 +234,7 @@ static void on_get_configuration(void *priv, uint64_t id)
 {
     struct usbredir *self = priv;
     struct usb_redir_configuration_status_header status = {
-        .status = usb_redir_success, .configuration = (uint8_t)usb_device_configuration(self->device)};
+        .status = usb_redir_success, .configuration = (uint8_t)usb_facts(self->device)->configuration};
     if (usbredir_is_early(self)) return;
     usbredirparser_send_configuration_status(self->parser, id, &status);
 }

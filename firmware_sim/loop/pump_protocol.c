@@ -155,6 +155,11 @@ static void look_back(const struct pump *pump, struct session *s)
     if (from < s->cursor) s->cursor = from;
 }
 
+static void open_at_cursor(const struct pump *pump, const struct session *s)
+{
+    if (pump->protocol->open != NULL) pump->protocol->open(s->protocol, time_of(pump, s->cursor));
+}
+
 /* Gives the protocol the descriptor, emitter and anchor from before the tick at the cursor. */
 static void greet(struct pump *pump, struct session *s)
 {
@@ -166,7 +171,7 @@ static void greet(struct pump *pump, struct session *s)
         len = latched_copy(&pump->stream->latched, frames, &version);
     } while (version != before);
     look_back(pump, s);
-    pump->protocol->open(s->protocol, time_of(pump, s->cursor));
+    open_at_cursor(pump, s);
     give_frames(pump->protocol, s, frames, len);
 }
 
@@ -207,7 +212,7 @@ static int pump_protocol_create(struct pump *pump, struct session *s, struct sh_
     s->hang_up = 0;
     if (s->units.bytes == NULL && unit_queue_create(&s->units, pump->out_cap) != SH_OK)
         return sh_fail(err, SH_ENOMEM, "no memory for a session");
-    return pump->protocol->create(&spec, &s->protocol, err);
+    return protocol_create(pump->protocol, &spec, &s->protocol, err);
 }
 
 int pump_check_stored(struct pump *pump, struct sh_err *err)
@@ -235,13 +240,13 @@ int session_restart_protocol(struct pump *pump, struct session *s)
     session_close_protocol(pump, s);
     struct sh_err err; /* not used: session_restart reports the failure */
     const int rc = pump_protocol_create(pump, s, &err);
-    if (rc == SH_OK) pump->protocol->open(s->protocol, time_of(pump, s->cursor));
+    if (rc == SH_OK) open_at_cursor(pump, s);
     return rc;
 }
 
 void session_close_protocol(struct pump *pump, struct session *s)
 {
-    pump->protocol->destroy(s->protocol);
+    protocol_destroy(pump->protocol, s->protocol);
     s->protocol = NULL;
     unit_queue_clear(&s->units);
 }
@@ -249,7 +254,7 @@ void session_close_protocol(struct pump *pump, struct session *s)
 /* Tells the protocol that time has come to the cursor. */
 static void pass_time(struct pump *pump, struct session *s)
 {
-    pump->protocol->time(s->protocol, time_of(pump, s->cursor));
+    if (pump->protocol->time != NULL) pump->protocol->time(s->protocol, time_of(pump, s->cursor));
 }
 
 /* Gives the next tick to the protocol. Returns 0 when there is none, when files have to catch up first, or when power
@@ -383,7 +388,7 @@ int session_write_protocol(struct pump *pump, struct session *s, int index)
 
 uint64_t session_wake_tick(const struct pump *pump, const struct session *s)
 {
-    if (pump->protocol->next_ns == NULL) return s->cursor;
+    if (pump->protocol->next_ns == NULL) return pump->protocol->time != NULL ? s->cursor : UINT64_MAX;
     int64_t next_ns = pump->protocol->next_ns(s->protocol);
     if (next_ns == INT64_MAX) return UINT64_MAX;
     uint64_t tick = next_ns > 0 ? (uint64_t)(next_ns / pump->stream->tick_ns) : 0;

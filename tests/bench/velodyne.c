@@ -100,7 +100,7 @@ static int measure(int dual)
     const struct protocol_spec spec = {.identity = &identity, .host = {.ctx = &s, .send = take_unit, .count = count}};
     void *protocol;
     double ns[ROUNDS];
-    if (make_turn(&s, dual) != 0 || ops->create(&spec, &protocol, NULL) != 0) return -1;
+    if (make_turn(&s, dual) != 0 || protocol_create(ops, &spec, &protocol, NULL) != 0) return -1;
     describe(ops, protocol, dual);
     for (int round = 0; round < ROUNDS; round++) {
         const double start_s = bench_thread_s();
@@ -111,7 +111,7 @@ static int measure(int dual)
     }
     printf("%-7s %5.1f ns a firing, %zu bytes of frames a turn, %.1f packets a turn\n", dual ? "dual" : "single",
            bench_median(ns, ROUNDS), s.len, (double)s.units / (double)(TURNS * ROUNDS));
-    ops->destroy(protocol);
+    protocol_destroy(ops, protocol);
     free(s.frames);
     return s.units == (uint64_t)ROUNDS * TURNS * FIRINGS / (dual ? 192 : 384) ? 0 : -1;
 }

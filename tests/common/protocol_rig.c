@@ -152,13 +152,13 @@ void protocol_rig_open(struct protocol_rig *rig, enum protocol_id id, const char
         .identity = &rig->identity,
         .host = {rig, keep_unit, answer, fix, count, hang_up, next_fix_ns, pps, date_ns, store, NULL},
         .power_ons = 1};
-    assert_int_equal(rig->ops->create(&rig->spec, &rig->protocol, &err), SH_OK);
+    assert_int_equal(protocol_create(rig->ops, &rig->spec, &rig->protocol, &err), SH_OK);
     if (rig->ops->open != NULL) rig->ops->open(rig->protocol, 0);
 }
 
 void protocol_rig_close(struct protocol_rig *rig)
 {
-    rig->ops->destroy(rig->protocol);
+    protocol_destroy(rig->ops, rig->protocol);
     rig->protocol = NULL;
     free(rig->bytes);
     rig->bytes = NULL;

@@ -99,7 +99,7 @@ static void say_again(const struct talk *talk, int loop)
     void *protocol;
     struct sh_err err;
     int64_t t_ns = 0;
-    if (ops->create(&spec, &protocol, &err) != SH_OK) return;
+    if (protocol_create(ops, &spec, &protocol, &err) != SH_OK) return;
     ops->open(protocol, 0);
     for (uint32_t i = 0; i < talk->n_requests && i < 100; i++) {
         const struct talk_request *r = &talk->request[i];
@@ -111,7 +111,7 @@ static void say_again(const struct talk *talk, int loop)
     }
     for (int i = 0; i < 100 && ops->next_ns(protocol) != INT64_MAX; i++)
         ops->time(protocol, ops->next_ns(protocol));
-    ops->destroy(protocol);
+    protocol_destroy(ops, protocol);
 }
 
 static void answer(const char *path, int loop)

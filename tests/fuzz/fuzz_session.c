@@ -109,7 +109,7 @@ static void open_session(enum protocol_id id, unsigned how)
                                .address = "127.0.0.1",
                                .port = 2368};
     rig.protocol = NULL;
-    if (rig.ops->create(&rig.spec, &rig.protocol, &err) != SH_OK) {
+    if (protocol_create(rig.ops, &rig.spec, &rig.protocol, &err) != SH_OK) {
         fuzz_must_be_line(&err);
         rig.protocol = NULL;
         return;
@@ -217,6 +217,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if ((which & 128) == 0 && rig.ops->frame != NULL) protocol_rig_describe(&rig, 0);
     for (int i = 0; i < MAX_RECORDS && in.n > 0 && !rig.hung_up; i++)
         act(&in, &t_ns, &line);
-    rig.ops->destroy(rig.protocol);
+    protocol_destroy(rig.ops, rig.protocol);
     return 0;
 }

@@ -33,13 +33,13 @@ static double read_loss(void *ctx)
 void fields_open(const struct cola_fields *fields)
 {
     struct sh_err err;
-    cola.ops->destroy(cola.protocol);
+    protocol_destroy(cola.ops, cola.protocol);
     cola.identity.fields = fields;
     cola.spec.host.window_loss_db = read_loss;
     fields_loss_db = 0.0;
     line = 0;
     fields_wall(10.0);
-    assert_int_equal(cola.ops->create(&cola.spec, &cola.protocol, &err), 0);
+    assert_int_equal(protocol_create(cola.ops, &cola.spec, &cola.protocol, &err), 0);
     cola.ops->open(cola.protocol, 0);
     protocol_rig_describe(&cola, 0);
 }

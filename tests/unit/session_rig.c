@@ -42,12 +42,11 @@ void expect_log(const char *text)
 
 struct doings does;
 
-static int create(const struct protocol_spec *given, void **protocol, struct sh_err *err)
+static int create(void *protocol, struct sh_err *err)
 {
     (void)err;
-    spec = *given;
-    *protocol = &does;
-    note("create %s|", given->stored);
+    memcpy(&spec, protocol, sizeof spec);
+    note("create %s|", spec.stored);
     return SH_OK;
 }
 
@@ -113,8 +112,9 @@ static int64_t next_ns(const void *protocol)
 
 static const struct protocol_ops all = {.name = "own",
                                         .max_unit = 256,
-                                        .create = create,
-                                        .destroy = destroy,
+                                        .size = sizeof(struct protocol_spec),
+                                        .begin = create,
+                                        .end = destroy,
                                         .open = opened,
                                         .frame = take_frame,
                                         .gap = gap,

@@ -107,7 +107,7 @@ void client_open(struct client *c, const struct made *m, uint32_t i, const struc
     memset(c, 0, sizeof *c);
     c->capture = capture;
     c->ops = protocol_ops_get(PROTOCOL_CAPTURE);
-    assert_int_equal(c->ops->create(&spec, &c->protocol, &err), SH_OK);
+    assert_int_equal(protocol_create(c->ops, &spec, &c->protocol, &err), SH_OK);
     c->ops->open(c->protocol, 0);
 }
 
@@ -125,6 +125,6 @@ const char *client_ask(struct client *c, const char *text, int ms)
 
 void client_close(struct client *c)
 {
-    c->ops->destroy(c->protocol);
+    protocol_destroy(c->ops, c->protocol);
     capture_free(c->capture);
 }

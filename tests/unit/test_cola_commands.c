@@ -40,10 +40,10 @@ static void clocks_begin_at_power_up(void **state)
 {
     (void)state;
     cola_open_lms();
-    cola.ops->destroy(cola.protocol);
+    protocol_destroy(cola.ops, cola.protocol);
     cola.spec.power_ns = INT64_C(3600000000000);
     cola.spec.power_ons = 3;
-    assert_int_equal(cola.ops->create(&cola.spec, &cola.protocol, NULL), 0);
+    assert_int_equal(protocol_create(cola.ops, &cola.spec, &cola.protocol, NULL), 0);
     protocol_rig_describe(&cola, 0);
     cola.ops->time(cola.protocol, INT64_C(3600000000000) * 3 + INT64_C(5000000000));
     cola_expect("sRN ODpwrc", "sRA ODpwrc 3");

@@ -8,9 +8,9 @@
 /* Opens another session of the same head, with the rig's spec as it is now. Returns the result of create. */
 static int open_again(struct sh_err *err)
 {
-    cola.ops->destroy(cola.protocol);
+    protocol_destroy(cola.ops, cola.protocol);
     cola.protocol = NULL;
-    const int rc = cola.ops->create(&cola.spec, &cola.protocol, err);
+    const int rc = protocol_create(cola.ops, &cola.spec, &cola.protocol, err);
     if (rc == 0) protocol_rig_describe(&cola, 0);
     return rc;
 }
@@ -120,7 +120,8 @@ static void wrong_lines_are_refused(void **state)
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
         struct sh_err err = {0};
         cola.spec.stored = wrong[i];
-        const int rc = cola.protocol != NULL ? open_again(&err) : cola.ops->create(&cola.spec, &cola.protocol, &err);
+        const int rc =
+            cola.protocol != NULL ? open_again(&err) : protocol_create(cola.ops, &cola.spec, &cola.protocol, &err);
         if (rc != SH_EINPUT) fail_msg("%s", wrong[i]);
         assert_non_null(strstr(err.text, "head.settings_file"));
     }
@@ -130,14 +131,14 @@ static void wrong_lines_are_refused(void **state)
     memset(text + strlen(text), 'x', sizeof text - strlen(text) - 1);
     text[sizeof text - 2] = '\n';
     cola.spec.stored = text;
-    assert_int_equal(cola.ops->create(&cola.spec, &cola.protocol, &err), SH_EINPUT);
+    assert_int_equal(protocol_create(cola.ops, &cola.spec, &cola.protocol, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, "'LocationName xxx"));
     /* The TiM has one echo. */
     snprintf(cola.identity.model, sizeof cola.identity.model, "TiM571");
     cola.spec.stored = "FREchoFilter 1\n";
-    assert_int_equal(cola.ops->create(&cola.spec, &cola.protocol, &err), SH_EINPUT);
+    assert_int_equal(protocol_create(cola.ops, &cola.spec, &cola.protocol, &err), SH_EINPUT);
     cola.spec.stored = "FREchoFilter 2\n";
-    assert_int_equal(cola.ops->create(&cola.spec, &cola.protocol, NULL), 0);
+    assert_int_equal(protocol_create(cola.ops, &cola.spec, &cola.protocol, NULL), 0);
 }
 
 /* ---- the dialect */

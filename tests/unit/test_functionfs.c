@@ -133,10 +133,10 @@ static void test_deconfigured(void **state)
     char text[8];
     event(&rig, FUNCTIONFS_ENABLE);
     settle(&rig); /* would go round for ever if what came back went out again */
-    assert_int_equal(usb_device_configuration(rig.host->device), 1);
+    assert_int_equal(usb_facts(rig.host->device)->configuration, 1);
     event(&rig, FUNCTIONFS_DISABLE);
     settle(&rig);
-    assert_int_equal(usb_device_configuration(rig.host->device), 0);
+    assert_int_equal(usb_facts(rig.host->device)->configuration, 0);
     /* The host brings it back: reads and writes go on. */
     host_sends(&rig, "abc");
     event(&rig, FUNCTIONFS_ENABLE);
@@ -176,11 +176,11 @@ static void test_busy_endpoint(void **state)
     struct rig rig = rig_open("/dev/null");
     event(&rig, FUNCTIONFS_ENABLE);
     handle(&rig);
-    assert_int_equal(usb_device_configuration(rig.host->device), 1);
+    assert_int_equal(usb_facts(rig.host->device)->configuration, 1);
     assert_true(rig.ops->more(rig.ffs)); /* completions wait, which no descriptor tells any more */
     event(&rig, FUNCTIONFS_DISABLE);
     handle(&rig);
-    assert_int_equal(usb_device_configuration(rig.host->device), 0);
+    assert_int_equal(usb_facts(rig.host->device)->configuration, 0);
     settle(&rig);
     rig_close(&rig);
 }

@@ -156,7 +156,7 @@ static void test_opening(void **state)
     assert_int_equal(le_get32((uint8_t *)bytes + 4), n);
     recv(kernel, bytes, sizeof bytes, 0);
     assert_int_equal(le_get32((uint8_t *)bytes), FUNCTIONFS_STRINGS_MAGIC);
-    assert_int_equal(usb_device_configuration(head.device), 0);
+    assert_int_equal(usb_facts(head.device)->configuration, 0);
     end();
 }
 
@@ -168,8 +168,8 @@ static void test_sessions(void **state)
     begin(USB_PERSONALITY_NATIVE);
     set_state("configured\n");
     event(FUNCTIONFS_ENABLE);
-    assert_int_equal(usb_device_configuration(head.device), 1);
-    assert_int_equal(usb_device_rate(head.device), USB_RATE_HIGH);
+    assert_int_equal(usb_facts(head.device)->configuration, 1);
+    assert_int_equal(usb_facts(head.device)->rate, USB_RATE_HIGH);
     assert_int_equal(write(master, "*IDN?\n", 6), 6);
     handle(0, 0);
     assert_int_equal(head.session[0].open, 1);
@@ -232,7 +232,7 @@ static void test_ends_of_sessions(void **state)
         const char *cut = scanhead_usb_cut(&head);
         assert_non_null(cut);
         assert_int_equal(strncmp(cut, rows[i].cut, strlen(rows[i].cut)), 0);
-        assert_int_equal(usb_device_configuration(head.device), rows[i].event == FUNCTIONFS_ENABLE);
+        assert_int_equal(usb_facts(head.device)->configuration, rows[i].event == FUNCTIONFS_ENABLE);
         if (rows[i].event != FUNCTIONFS_ENABLE) assert_int_equal(self->console.fd, -1);
     }
     end();
@@ -248,8 +248,8 @@ static void test_faults(void **state)
     event(FUNCTIONFS_ENABLE);
     assert_int_equal(ops->fault(backend, USB_FAULT_UNPLUG), SH_OK);
     assert_string_equal(configfs_get(self->gadget.dir, "UDC"), "\n");
-    assert_int_equal(usb_device_configuration(head.device), 0);
-    assert_int_equal(usb_device_end(head.device), USB_END_UNPLUGGED);
+    assert_int_equal(usb_facts(head.device)->configuration, 0);
+    assert_int_equal(usb_facts(head.device)->end, USB_END_UNPLUGGED);
     assert_int_equal(ops->fault(backend, USB_FAULT_UNPLUG), SH_ESTATE);
     assert_int_equal(ops->fault(backend, USB_FAULT_RESET), SH_ESTATE);
     configfs.busy = "udc.0"; /* another gadget has taken the controller */
@@ -259,9 +259,9 @@ static void test_faults(void **state)
     assert_string_equal(configfs_get(self->gadget.dir, "UDC"), "udc.0\n");
     assert_int_equal(ops->fault(backend, USB_FAULT_PLUG), SH_OK); /* it is there */
     event(FUNCTIONFS_ENABLE);
-    assert_int_equal(usb_device_configuration(head.device), 1);
+    assert_int_equal(usb_facts(head.device)->configuration, 1);
     assert_int_equal(ops->fault(backend, USB_FAULT_RESET), SH_OK);
-    assert_int_equal(usb_device_configuration(head.device), 0);
+    assert_int_equal(usb_facts(head.device)->configuration, 0);
     assert_string_equal(configfs_get(self->gadget.dir, "UDC"), "udc.0\n");
     end();
 }
@@ -280,29 +280,29 @@ static void test_port_alone(void **state)
     assert_int_equal(recv(kernel, said, 1, MSG_DONTWAIT), -1); /* nothing is described */
     set_state("configured\n");
     handle(0, 0);
-    assert_int_equal(usb_device_configuration(head.device), 0); /* no change was reported */
+    assert_int_equal(usb_facts(head.device)->configuration, 0); /* no change was reported */
     handle(POLLPRI | POLLERR, 0);
-    assert_int_equal(usb_device_configuration(head.device), 1);
-    const uint32_t first = usb_device_attaches(head.device);
+    assert_int_equal(usb_facts(head.device)->configuration, 1);
+    const uint32_t first = usb_facts(head.device)->attaches;
     set_state("suspended\n");
     handle(POLLPRI, 0);
-    assert_int_equal(usb_device_configuration(head.device), 1);
+    assert_int_equal(usb_facts(head.device)->configuration, 1);
     set_state("configured\n");
     handle(POLLPRI, 0);
-    assert_int_equal(usb_device_attaches(head.device), first);
+    assert_int_equal(usb_facts(head.device)->attaches, first);
     handle(0, POLLHUP); /* it was not configured for a while */
-    assert_int_equal(usb_device_configuration(head.device), 1);
-    assert_int_equal(usb_device_attaches(head.device), first + 1);
+    assert_int_equal(usb_facts(head.device)->configuration, 1);
+    assert_int_equal(usb_facts(head.device)->attaches, first + 1);
     set_state("addressed\n");
     handle(POLLPRI, 0);
-    assert_int_equal(usb_device_configuration(head.device), 0);
+    assert_int_equal(usb_facts(head.device)->configuration, 0);
     assert_int_equal(self->console.fd, -1);
     set_state("configured\n");
     handle(POLLPRI, 0);
     set_state("not attached\n");
     handle(POLLPRI, 0);
-    assert_int_equal(usb_device_configuration(head.device), 0);
-    assert_int_equal(usb_device_end(head.device), USB_END_UNPLUGGED);
+    assert_int_equal(usb_facts(head.device)->configuration, 0);
+    assert_int_equal(usb_facts(head.device)->end, USB_END_UNPLUGGED);
     end();
 }
 

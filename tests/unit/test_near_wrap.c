@@ -7,9 +7,9 @@
 static void open_again(struct protocol_rig *r, uint32_t near_wrap)
 {
     struct sh_err err;
-    r->ops->destroy(r->protocol);
+    protocol_destroy(r->ops, r->protocol);
     r->spec.near_wrap = near_wrap;
-    assert_int_equal(r->ops->create(&r->spec, &r->protocol, &err), 0);
+    assert_int_equal(protocol_create(r->ops, &r->spec, &r->protocol, &err), 0);
     r->ops->open(r->protocol, 0);
     protocol_rig_describe(r, 0);
     protocol_rig_clear(r);

@@ -308,7 +308,7 @@ static void destroy(void *protocol)
 static void units_that_wait_at_the_end_are_lost(void **state)
 {
     (void)state;
-    static const struct protocol_ops other = {.name = "other", .destroy = destroy};
+    static const struct protocol_ops other = {.name = "other", .end = destroy};
     pump.protocol = &other;
     pump.counts.sent_units = 50;
     n_destroyed = 0;

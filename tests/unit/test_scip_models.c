@@ -17,8 +17,8 @@ static void open_with(const char *model, const char *firmware, const char *seria
     scip_open(model);
     strcpy(rig.identity.firmware, firmware);
     strcpy(rig.identity.serial, serial);
-    rig.ops->destroy(rig.protocol);
-    assert_int_equal(rig.ops->create(&rig.spec, &rig.protocol, &err), 0);
+    protocol_destroy(rig.ops, rig.protocol);
+    assert_int_equal(protocol_create(rig.ops, &rig.spec, &rig.protocol, &err), 0);
     rig.ops->open(rig.protocol, 0);
     rig.descriptor.range_min_m = min_m;
     rig.descriptor.range_max_m = max_m;
@@ -147,8 +147,8 @@ static void time_since_power_up(void **state)
     struct sh_err err;
     scip_open("UTM-30LX-EW");
     rig.spec.power_ns = 5000000000;
-    rig.ops->destroy(rig.protocol);
-    assert_int_equal(rig.ops->create(&rig.spec, &rig.protocol, &err), 0);
+    protocol_destroy(rig.ops, rig.protocol);
+    assert_int_equal(protocol_create(rig.ops, &rig.spec, &rig.protocol, &err), 0);
     rig.ops->open(rig.protocol, rig.spec.power_ns);
     time_is_ms(5000 + 16000000);
     scip_ask("TM1\n", "TM1\n00P\nm2@0?\n\n");

@@ -210,7 +210,7 @@ static void test_all(void **state)
                 if ((type & USB_TYPE_MASK) == 0 && memchr(known, (int)request, sizeof known) == NULL)
                     fail_msg("request %02x %02x is answered", type, request);
                 if ((type & USB_TYPE_MASK) == USB_TYPE_MASK || (type & 0x1f) > 3) fail_msg("type %02x", type);
-                if (usb_device_configuration(host->device) == 0) {
+                if (usb_facts(host->device)->configuration == 0) {
                     usb_device_reset(host->device);
                     host_configure(host);
                 }

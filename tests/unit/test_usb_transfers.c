@@ -265,7 +265,7 @@ static void test_begun_again(void **state)
     const uint32_t out = usb_device_epoch(host->device, 0x02), in = usb_device_epoch(host->device, 0x81);
     assert_int_equal(host_control(host, 1, USB_REQ_SET_INTERFACE, 0, 0, 0, NULL), 0);
     assert_int_equal(host->n_changes, 3);
-    assert_int_equal(usb_device_end(host->device), USB_END_CONFIGURED);
+    assert_int_equal(usb_facts(host->device)->end, USB_END_CONFIGURED);
     host_expect(host, 1, USB_GONE, 30);
     host_expect(host, 2, USB_GONE, 0);
     assert_int_not_equal(usb_device_epoch(host->device, 0x02), out);
@@ -280,7 +280,7 @@ static void test_begun_again(void **state)
     host_expect(host, 5, USB_OK, 100);
     usb_device_reset(host->device);
     assert_int_equal(host->n_changes, 4);
-    assert_int_equal(usb_device_end(host->device), USB_END_RESET);
+    assert_int_equal(usb_facts(host->device)->end, USB_END_RESET);
     host_submit(host, 6, 0x81, NULL, 512); /* the endpoint is there no more */
     host_expect(host, 6, USB_GONE, 0);
     host_free(host);

@@ -49,9 +49,9 @@ static int note_time(void *ctx, int64_t t_ns, struct nmea_fix *fix)
 static void open_again(int64_t t_ns)
 {
     struct sh_err err;
-    rig.ops->destroy(rig.protocol);
+    protocol_destroy(rig.ops, rig.protocol);
     rig.spec.host.fix = note_time;
-    assert_int_equal(rig.ops->create(&rig.spec, &rig.protocol, &err), 0);
+    assert_int_equal(protocol_create(rig.ops, &rig.spec, &rig.protocol, &err), 0);
     rig.ops->open(rig.protocol, t_ns);
 }
 
@@ -130,8 +130,8 @@ static void test_without_utc(void **state)
     (void)state;
     rig.fix.quality = 0; /* the rig has none then */
     const int64_t hour_ns = INT64_C(3600000000000), first_ns = (hour_ns / 18579456 + 1) * 18579456;
-    rig.ops->destroy(rig.protocol);
-    assert_int_equal(rig.ops->create(&rig.spec, &rig.protocol, NULL), 0);
+    protocol_destroy(rig.ops, rig.protocol);
+    assert_int_equal(protocol_create(rig.ops, &rig.spec, &rig.protocol, NULL), 0);
     rig.ops->open(rig.protocol, hour_ns);
     rig.ops->time(rig.protocol, first_ns + 1);
     assert_int_equal(rig.n_units, 1);

@@ -33,8 +33,8 @@ int http_teardown(void **state)
 void http_renew(void)
 {
     struct sh_err err;
-    http_rig.ops->destroy(http_rig.protocol);
-    assert_int_equal(http_rig.ops->create(&http_rig.spec, &http_rig.protocol, &err), SH_OK);
+    protocol_destroy(http_rig.ops, http_rig.protocol);
+    assert_int_equal(protocol_create(http_rig.ops, &http_rig.spec, &http_rig.protocol, &err), SH_OK);
     http_rig.ops->open(http_rig.protocol, 0);
     protocol_rig_clear(&http_rig);
     http_rig.hung_up = 0;

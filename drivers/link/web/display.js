@@ -4,10 +4,8 @@
 import {bodyOf, byId, kept, make, say} from './page.js';
 import {ageRow} from './ages.js';
 import {Limits} from './limits.js';
+import {MODES} from './view_colours.js';
 import {css, download, drawLegend, fileName, MOST_ITEMS, moreItems} from './picture.js';
-
-const MODES = [['height', 'Height'], ['range', 'Range'], ['reflectance', 'Reflectance'], ['amplitude', 'Amplitude'],
-  ['label', 'Surface'], ['echo', 'Echo'], ['station', 'Station'], ['age', 'Age'], ['rgb', 'Colours of the points']];
 
 export class Display {
   #view;
@@ -26,7 +24,7 @@ export class Display {
       return;
     }
     const mode = make('select', {id: 'colour', change: () => this.#colour(mode.value)},
-      ...MODES.map(([value, name]) => make('option', {value}, name)));
+      ...Object.entries(MODES).map(([value, {title}]) => make('option', {value}, value === 'rgb' ? 'Colours of the points' : title)));
     const size = make('input', {id: 'size', type: 'range', min: 1, max: 8, step: 0.5, input: () => this.#size(size)});
     this.sizeText = make('output', {for: 'size', class: 'unit'});
     this.#limits = new Limits(view);
@@ -43,7 +41,7 @@ export class Display {
         make('button', {type: 'button', id: 'screenshot', title: 'The picture with its legend, as a PNG file',
           click: () => this.#save()}, 'Save picture'))];
     body.append(...rows.filter(Boolean));
-    mode.value = MODES.some(([value]) => value === kept.get('colour')) ? kept.get('colour') : 'height';
+    mode.value = Object.hasOwn(MODES, kept.get('colour')) ? kept.get('colour') : 'height';
     size.value = kept.get('size') ?? 2;
     this.#colour(mode.value);
     this.#size(size);

@@ -7,7 +7,7 @@
 // angles times the range. The error of a figure follows from its points to first order, by differences.
 
 import {isOutside, isPointOutside} from './cloud.js';
-import {add, dot, sub} from './view_camera.js';
+import {add, cross, dot, sub, unit} from './view_camera.js';
 import {headAxes} from './view_stations.js';
 import {isWithin} from './section.js';
 
@@ -16,9 +16,7 @@ const STEP_M = 1e-4; // of the differences; figures are smooth over it
 // moved after the scan.
 const PLACED = 0.01;
 
-const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const length = (v) => Math.hypot(...v);
-const unit = (v) => v.map((c) => c / length(v));
 export const placeOf = ({x, y, z}) => [x, y, z];
 
 function rangeVariance(t, range_m, amplitude_db) {

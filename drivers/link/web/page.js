@@ -29,6 +29,12 @@ export function say(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
+// Makes a field for a number, and a box with the field and its label.
+export function numberField(id, label, attributes) {
+  const field = make('input', {id, type: 'text', inputmode: 'decimal', autocomplete: 'off', spellcheck: 'false', ...attributes});
+  return {field, box: make('div', {}, make('label', {for: id}, label), field)};
+}
+
 // Marks a field as valid or not.
 export function markField(field, isRight) {
   if (isRight) field.removeAttribute('aria-invalid');
@@ -139,6 +145,13 @@ export const kept = {
     } catch { /* private windows store nothing */ }
   },
 };
+
+// Fetches one of the link's resources. Throws an Error with the head's words, and with the status.
+export async function fetchOrThrow(path, options) {
+  const answer = await fetch(path, options);
+  if (answer.ok) return answer;
+  throw Object.assign(new Error((await answer.text()).trim() || `${path}: ${answer.status}`), {status: answer.status});
+}
 
 const AGAIN_MS = 100, AGAIN_MOST_MS = 1600; // a head that has no room for a request is asked again, ever less often
 

@@ -2,6 +2,7 @@
 // This module asks a head what stations would see from other places, and reads its answers. The answers' formats stand
 // in firmware_sim/app/studio/preview/README.md. Reading is pure.
 
+import {fetchOrThrow} from './page.js';
 import {isWithin} from './section.js';
 
 const AGAIN_MS = 15, AGAIN_MOST_MS = 200; // an answer is asked for again, ever less often
@@ -9,9 +10,7 @@ const AGAIN_MS = 15, AGAIN_MOST_MS = 200; // an answer is asked for again, ever 
 // Returns the bytes of an answer, once the head has it. Throws an Error with the head's words, or once `signal` aborts.
 export async function ask(path, signal) {
   for (let wait_ms = AGAIN_MS; ; wait_ms = Math.min(AGAIN_MOST_MS, 1.5 * wait_ms)) {
-    const answer = await fetch(path, {cache: 'no-store', signal});
-    if (!answer.ok) throw Object.assign(new Error((await answer.text()).trim()), {status: answer.status});
-    const bytes = await answer.arrayBuffer();
+    const bytes = await (await fetchOrThrow(path, {cache: 'no-store', signal})).arrayBuffer();
     if (bytes.byteLength > 0) return bytes;
     await new Promise((done) => setTimeout(done, wait_ms));
   }

@@ -2,14 +2,12 @@
 // Reads a recording from the link: clouds in columns, meshes with sorted triangles. The module is pure except for
 // fetch.
 
+import {fetchOrThrow} from './page.js';
+
 const KINDS = {1: Uint8Array, 2: Uint16Array, 3: Uint32Array, 4: Float32Array};
 const POINTS_AT_A_TIME = 200000, TRIANGLES_AT_A_TIME = 1 << 20;
 
-async function fetchBytes(path, signal) {
-  const answer = await fetch(path, {signal});
-  if (!answer.ok) throw new Error((await answer.text()).trim() || `${path}: ${answer.status}`);
-  return answer.arrayBuffer();
-}
+const fetchBytes = async (path, signal) => (await fetchOrThrow(path, {signal})).arrayBuffer();
 
 // Reads the bytes of /cloud or /sparse: {n, first, every, total, origin, columns: {name: typed array}}
 function readCloud(bytes) {

@@ -1,17 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 // This row saves the points so far as a file. The head writes it, in the formats of `scanhead record` (GET /save), and
 // the page fetches it in pieces.
-import {grouped, make, say} from './page.js';
+import {fetchOrThrow, grouped, make, say} from './page.js';
 import {download, fileName} from './picture.js';
 
 const FORMATS = [['las', 'LAS'], ['ply', 'PLY'], ['e57', 'E57'], ['ptx', 'PTX'], ['pcapng', 'pcapng']];
 const ASK_MS = 300;
 
-async function get(path) {
-  const answer = await fetch(path, {cache: 'no-store'});
-  if (!answer.ok) throw new Error((await answer.text()).trim() || `the head does not give ${path}`);
-  return answer;
-}
+const get = (path) => fetchOrThrow(path, {cache: 'no-store'});
 
 // Returns {blob, gone, lost_frames}: the file, how many points it lacks, and the frames that did not reach the head's
 // store. Another page may begin a file of its own as soon as this one is done.

@@ -2,7 +2,7 @@
 // A section is the part of the scene that is seen. It is a box that may be turned about the vertical, or all between
 // two heights. The module is pure; lengths are metres in the scene's frame, relative to an origin where one is given.
 
-import {add, dot, radians, sub} from './view_camera.js';
+import {add, dot, radians, sub, unit} from './view_camera.js';
 
 const WIDE = 1e9; // half of a height cut's width: its sides lie beyond any scene
 const THIN = 0.02; // a box is at least so thick
@@ -108,8 +108,7 @@ export function isWithin({middle, half, turn: [c, s]}, x, y, z) {
 // A line goes through `at` in the direction `along`, and a ray from the eye through x, y of the screen. Returns the
 // distance from `at` to the line's point that is closest to the ray; null if the line points at the eye.
 export function alongLine(camera, at, along, x, y) {
-  const o = camera.from(x, y), r = camera.ray(x, y);
-  const f = r.map((c) => c / Math.hypot(...r));
+  const o = camera.from(x, y), f = unit(camera.ray(x, y));
   const slant = dot(along, f);
   const square = 1 - slant * slant;
   if (square < 0.02) return null;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // This tool looks into a house, by a section box, or by a cut between two heights. The tool's handles are sliders on
 // the picture, for pointer, touch and keys. The section stays after the tool is left, until it is switched off.
-import {byId, make, numberOf, say} from './page.js';
+import {byId, make, numberField, numberOf, say} from './page.js';
 import {alongLine, Section} from './section.js';
 import {arrowStep, degrees, headingTo, onPlane, sub} from './view_camera.js';
 
@@ -35,15 +35,10 @@ export class SectionTool {
       this.#kinds.set(value, box);
       return make('label', {class: 'tick'}, box, name);
     };
-    const field = ([id, name]) => {
-      const input = make('input', {type: 'text', inputmode: 'decimal', autocomplete: 'off', id: `section-${id}`, change: () => this.#typed()});
-      const box = make('div', {}, make('label', {for: input.id}, name), input);
-      this.#fields.set(id, {input, box});
-      return box;
-    };
+    for (const [id, name] of FIELDS) this.#fields.set(id, numberField(`section-${id}`, name, {change: () => this.#typed()}));
     this.body = make('div', {}, make('div', {class: 'ticks', role: 'radiogroup', 'aria-label': 'Section'},
       kind('off', 'All'), kind('height', 'Height cut'), kind('box', 'Box')),
-    make('div', {class: 'place-fields'}, ...FIELDS.map(field)), this.#says,
+    make('div', {class: 'place-fields'}, ...[...this.#fields.values()].map(({box}) => box)), this.#says,
     this.fit = make('button', {type: 'button', id: 'section-fit', click: () => this.#choose(this.#section?.kind)}, 'Around everything'));
     byId('stage').append(this.#layer);
     this.#kinds.get('off').checked = true;
@@ -95,16 +90,16 @@ export class SectionTool {
     const s = this.#section;
     const values = s && {from: s.from_m, to: s.to_m, wide: 2 * s.half[0], deep: 2 * s.half[1], x: s.middle[0], y: s.middle[1],
       heading: s.heading_deg};
-    for (const [id, {input, box}] of this.#fields) {
+    for (const [id, {field, box}] of this.#fields) {
       box.hidden = !s || (s.kind === 'height' && !['from', 'to'].includes(id));
-      if (s) input.value = shown(values[id]);
+      if (s) field.value = shown(values[id]);
     }
     this.fit.hidden = !s;
   }
 
   #typed() {
     const s = this.#section;
-    const v = Object.fromEntries([...this.#fields].map(([id, {input}]) => [id, numberOf(input.value)]));
+    const v = Object.fromEntries([...this.#fields].map(([id, {field}]) => [id, numberOf(field.value)]));
     const isSound = Object.values(v).every(Number.isFinite) && v.wide > 0 && v.deep > 0;
     if (!isSound || !s.between(v.from, v.to)) {
       this.#show();

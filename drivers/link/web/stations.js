@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 // This panel shows the places of the stations. With control, and while the head is idle, they can be moved.
-import {bodyOf, fetchJson, make, placeText, say} from './page.js';
+import {bodyOf, fetchJson, make, numberField, placeText, say} from './page.js';
 import {why} from './session.js';
 
 export const PARTS = [['x_m', 'East x', 'm'], ['y_m', 'North y', 'm'], ['z_m', 'Height z', 'm'],
@@ -83,12 +83,8 @@ export class Stations extends EventTarget {
 
   #make(station) {
     const {number} = station;
-    const fields = PARTS.map(([key, name, unit]) => {
-      const id = `station-${number}-${key}`;
-      const field = make('input', {id, type: 'text', inputmode: 'decimal', autocomplete: 'off', spellcheck: 'false',
-        input: () => this.#allow()});
-      return {key, field, box: make('div', {}, make('label', {for: id}, `${name}, ${unit}`), field)};
-    });
+    const fields = PARTS.map(([key, name, unit]) =>
+      ({key, ...numberField(`station-${number}-${key}`, `${name}, ${unit}`, {input: () => this.#allow()})}));
     const button = (name, click, title) => make('button', {type: 'button', click, title}, name);
     const buttons = {
       move: make('button', {type: 'submit', class: 'main'}, 'Move'),

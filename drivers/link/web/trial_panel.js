@@ -3,7 +3,7 @@
 // alone, the surface that they see together, and the best next place. The part takes the place of the list of stations
 // while it is open.
 
-import {bodyOf, grouped, kept, make, markField, numberOf, percent, placeText, say} from './page.js';
+import {bodyOf, grouped, kept, make, markField, numberField, numberOf, percent, placeText, say} from './page.js';
 import {why} from './session.js';
 import {Cloud} from './cloud.js';
 import {PARTS} from './stations.js';
@@ -192,13 +192,9 @@ export class TrialPanel {
   }
 
   #item({number, name, isAdded}, colour) {
-    const field = (key, label) => {
-      const id = `trial-${number}-${key}`;
-      const input = make('input', {id, type: 'text', inputmode: 'decimal', autocomplete: 'off', spellcheck: 'false',
-        change: () => this.#edit(number, key, input), placeholder: key in NAMES ? 'as set' : ''});
-      return {key, input, box: make('div', {}, make('label', {for: id}, label), input)};
-    };
-    const fields = [...PLACE, ...SETTINGS.map((key) => [key, NAMES[key]])].map(([key, label]) => field(key, label));
+    const fields = [...PLACE, ...SETTINGS.map((key) => [key, NAMES[key]])].map(([key, label]) =>
+      ({key, ...numberField(`trial-${number}-${key}`, label,
+        {change: ({target}) => this.#edit(number, key, target), placeholder: key in NAMES ? 'as set' : ''})}));
     const place = make('span', {class: 'place'}), mark = make('span', {class: 'refusal'}), says = make('p', {class: 'refusal', role: 'status'});
     const actions = make('div', {class: 'actions'},
       make('button', {type: 'button', click: () => this.#view.lookFrom(number)}, 'Look from here'),
@@ -214,8 +210,8 @@ export class TrialPanel {
   #fill(station) {
     const {fields, place, says, mark} = this.#items.get(station.number);
     say(place, placeText(station));
-    for (const {key, input} of fields) {
-      if (document.activeElement !== input) input.value = shown(station[key]);
+    for (const {key, field} of fields) {
+      if (document.activeElement !== field) field.value = shown(station[key]);
     }
     says.hidden = station.error === '';
     say(says, station.error);

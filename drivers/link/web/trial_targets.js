@@ -4,6 +4,7 @@
 
 import {make, say} from './page.js';
 import {hasBit} from './previews.js';
+import {cross, dot} from './view_camera.js';
 import {searchSlowly} from './view_pick.js';
 
 const NEEDED = 3;
@@ -20,8 +21,7 @@ export function cellAt(cells, [x, y, z]) {
     const far = Math.hypot(...d);
     if (far >= least) continue;
     const [u, v] = [0, 1].map((k) => [0, 1, 2].map((a) => corners[at + 3 * (k + 1) + a] - corners[at + a]));
-    const n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
-    const off = Math.abs(n[0] * d[0] + n[1] * d[1] + n[2] * d[2]) / (Math.hypot(...n) || 1);
+    const n = cross(u, v), off = Math.abs(dot(n, d)) / (Math.hypot(...n) || 1);
     if (far + 10 * off >= least) continue;
     least = far + 10 * off;
     best = cell[i];

@@ -18,6 +18,8 @@ const FILLED = 0.97; // a fitted box fills this share of the picture's width or 
 export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 export const add = (a, b, k = 1) => [a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2]];
 export const sub = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+export const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+export const unit = (v) => v.map((c) => c / Math.hypot(...v));
 export const clamp = (v, lo, hi) => Math.min(hi, Math.max(lo, v));
 export const degrees = (rad) => ((rad * 180 / Math.PI) % 360 + 360) % 360;
 export const radians = (deg) => deg * Math.PI / 180;

@@ -2,6 +2,8 @@
 // This module makes meshes as arrays: the coarse scene from its bytes, its edges, and the shapes of a station. The
 // module is pure.
 
+import {cross, dot, sub, unit} from './view_camera.js';
+
 const MAGIC = 0x43534853; // "SHSC"
 
 // Returns {origin, positions, triangles} of the bytes of /scene. Throws an Error that says what is wrong with the
@@ -35,20 +37,17 @@ export function featureEdges(positions, triangles, least = 0.6) {
   for (let t = 0; t < triangles.length; t += 3) {
     const v = [0, 1, 2].map((k) => triangles[t + k]);
     const p = v.map((i) => positions.subarray(3 * i, 3 * i + 3));
-    const u = [0, 1, 2].map((a) => p[1][a] - p[0][a]), w = [0, 1, 2].map((a) => p[2][a] - p[0][a]);
-    const n = [u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]];
-    const length = Math.hypot(...n);
-    if (!(length > 0)) continue;
+    const faces = unit(cross(sub(p[1], p[0]), sub(p[2], p[0])));
+    if (faces.some(Number.isNaN)) continue; // it has no area
     for (let k = 0; k < 3; k++) {
       const a = id[v[k]], b = id[v[(k + 1) % 3]];
       if (a === b) continue;
       const key = Math.min(a, b) * id.length + Math.max(a, b);
-      const unit = n.map((c) => c / length);
       const edge = edges.get(key);
-      if (edge === undefined) edges.set(key, {a, b, unit, n: 1, sharp: false});
+      if (edge === undefined) edges.set(key, {a, b, faces, n: 1, sharp: false});
       else {
         edge.n++;
-        edge.sharp ||= Math.abs(unit[0] * edge.unit[0] + unit[1] * edge.unit[1] + unit[2] * edge.unit[2]) < flat;
+        edge.sharp ||= Math.abs(dot(faces, edge.faces)) < flat;
       }
     }
   }
@@ -59,13 +58,8 @@ export function featureEdges(positions, triangles, least = 0.6) {
 
 // Adds a rod of `sides` faces from a to b.
 function rod(mesh, a, b, ra, rb = ra, sides = 8) {
-  const d = [0, 1, 2].map((i) => b[i] - a[i]);
-  const length = Math.hypot(...d);
-  const n = d.map((c) => c / length);
-  const u = Math.abs(n[2]) < 0.9 ? [n[1], -n[0], 0] : [0, n[2], -n[1]];
-  const k = 1 / Math.hypot(...u);
-  const e = u.map((c) => c * k);
-  const f = [n[1] * e[2] - n[2] * e[1], n[2] * e[0] - n[0] * e[2], n[0] * e[1] - n[1] * e[0]];
+  const n = unit(sub(b, a));
+  const e = unit(Math.abs(n[2]) < 0.9 ? [n[1], -n[0], 0] : [0, n[2], -n[1]]), f = cross(n, e);
   const first = mesh.positions.length / 3;
   for (let s = 0; s < sides; s++) {
     const c = Math.cos(2 * Math.PI * s / sides), si = Math.sin(2 * Math.PI * s / sides);
