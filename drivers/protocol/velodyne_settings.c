@@ -118,7 +118,7 @@ static int set_address(const struct posted *p, const char *value)
 
 static int set_port(const struct posted *p, const char *value)
 {
-    const long present = strcmp(p->key, "dport") == 0 ? velodyne_host_port(p->spec) : VELODYNE_POSITION_PORT;
+    const long present = strcmp(p->key, "dport") == 0 ? velodyne_host_port(p->spec) : velodyne_position_port(p->spec);
     long port;
     if (!read_number(value, &port) || port < 1 || port > 65535)
         return refuse(p, 400, "dport, tport: allowed are 1 to 65535");
@@ -336,4 +336,9 @@ const char *velodyne_host_address(const struct protocol_spec *spec)
 int velodyne_host_port(const struct protocol_spec *spec)
 {
     return spec->port != 0 ? spec->port : VELODYNE_DATA_PORT;
+}
+
+int velodyne_position_port(const struct protocol_spec *spec)
+{
+    return spec->position_port != 0 ? spec->position_port : VELODYNE_POSITION_PORT;
 }

@@ -127,6 +127,22 @@ static void test_settings(void **state)
     assert_int_equal(http_rig.hung_up, 0);
 }
 
+/* Clients post the host that they have read. The links have other ports than the device. */
+static void test_host_of_the_links(void **state)
+{
+    (void)state;
+    strcpy(http_rig.spec.address, "127.0.0.1");
+    http_rig.spec.port = 40368;
+    http_rig.spec.position_port = 41308;
+    http_renew();
+    http_get("/cgi/settings.json");
+    assert_non_null(strstr(http_body(), "\"host\":{\"addr\":\"127.0.0.1\",\"dport\":40368,\"tport\":41308},"));
+    http_post("/cgi/setting/host", "addr=127.0.0.1&dport=40368&tport=41308");
+    assert_int_equal(http_status(), 200);
+    http_post("/cgi/setting/host", "tport=8308");
+    assert_int_equal(http_status(), 409);
+}
+
 /* Where the head keeps settings, /cgi/save has it do so; a head that another session controls can't. */
 static void test_save(void **state)
 {
@@ -331,10 +347,19 @@ static void test_names_are_escaped(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        TEST(test_curl),         TEST(test_mrpt),     TEST(test_urllib),
-        TEST(test_settings),     TEST(test_save),     TEST(test_idle_clients),
-        TEST(test_head_at_rest), TEST(test_reset),    TEST(test_refused_by_the_head),
-        TEST(test_documents),    TEST(test_snapshot), TEST(test_names_are_escaped),
+        TEST(test_curl),
+        TEST(test_mrpt),
+        TEST(test_urllib),
+        TEST(test_settings),
+        TEST(test_host_of_the_links),
+        TEST(test_save),
+        TEST(test_idle_clients),
+        TEST(test_head_at_rest),
+        TEST(test_reset),
+        TEST(test_refused_by_the_head),
+        TEST(test_documents),
+        TEST(test_snapshot),
+        TEST(test_names_are_escaped),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
