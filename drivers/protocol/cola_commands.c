@@ -122,7 +122,7 @@ static struct parts cut(const struct cola_request *r)
     for (; at<end && * at> ' ' && *at <= '~'; at++)
         if (n + 1 < sizeof p.name) p.name[n++] = (char)*at;
     if (at < end && *at == ' ') at++;
-    p.args.at = at;
+    p.args.at = p.verb == 'R' ? end : at; /* clients put a 1 after the name; a read has no values that could be wrong */
     p.args.end = end;
     return p;
 }

@@ -74,7 +74,7 @@ static int read_head(struct http_reader *r, struct http_fields *f)
     if (status == 0) status = http_read_fields(r->bytes, r->head_len, at, f);
     if (status == 0) status = http_find_place(f, q->minor, target.place, &place);
     if (status != 0) return status;
-    if (f->has_coding || (f->n_length == 0 && strcmp(q->method, "POST") == 0)) return 411;
+    if (f->has_coding) return 411;
     if (f->length > HTTP_MAX_BODY) return 413;
     if (f->expects_other) return 417;
     q->keep_alive = !f->closes && (q->minor > 0 || f->keeps_alive);

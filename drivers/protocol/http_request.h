@@ -3,8 +3,8 @@
  * with bounded memory.
  *
  * Bytes go in, in pieces of any size. Requests come out one after the other, or the status that answers a
- * broken one; after a broken one the connection can't go on. Bodies have a Content-Length; chunked ones are
- * refused. Pure; allocates nothing; any thread. */
+ * broken one; after a broken one the connection can't go on. Bodies have a Content-Length; without one a
+ * request has no body (RFC 9112, 6.3). Chunked ones are refused. Pure; allocates nothing; any thread. */
 #ifndef DRIVERS_PROTOCOL_HTTP_REQUEST_H
 #define DRIVERS_PROTOCOL_HTTP_REQUEST_H
 

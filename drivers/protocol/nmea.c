@@ -5,6 +5,7 @@
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "drivers/protocol/protocol.h"
 
@@ -16,6 +17,29 @@ struct sentence {
     size_t cap, len;
     uint8_t spoil; /* bits of the checksum that are wrong */
 };
+
+/* Decimals of minutes of arc, and of heights in metres and speeds in knots. */
+struct decimals {
+    int minutes, others;
+};
+
+/* From the finest on; a sentence that is too long is written with the next ones. A minute's seventh decimal is 0.19 mm.
+ * The last ones hold any speed below 1e7 knots in 72 characters. */
+static const struct decimals finest_first[] = {{7, 3}, {6, 3}, {6, 2}, {5, 2}, {4, 2}, {4, 1}, {4, 0}, {3, 0}};
+enum { N_DECIMALS = sizeof finest_first / sizeof finest_first[0] };
+
+typedef size_t placed(char *dst, size_t cap, const struct nmea_fix *fix, const struct decimals *decimals);
+
+static size_t encode_within(placed *encode, char *dst, size_t cap, const struct nmea_fix *fix, size_t most)
+{
+    char text[NMEA_MAX_SENTENCE];
+    size_t i = 0, len = encode(text, sizeof text, fix, &finest_first[i]);
+    while (len > most && ++i < N_DECIMALS)
+        len = encode(text, sizeof text, fix, &finest_first[i]);
+    if (len == 0 || len >= cap) return 0;
+    memcpy(dst, text, len + 1);
+    return len;
+}
 
 static void nmea_put(struct sentence *s, const char *fmt, ...) __attribute__((format(printf, 2, 3)));
 static void nmea_put(struct sentence *s, const char *fmt, ...)
@@ -46,57 +70,82 @@ static void put_time(struct sentence *s, const struct nmea_fix *fix)
     nmea_put(s, ",%02d%02d%02d.%02d", fix->hour, fix->minute, fix->second, fix->hundredth);
 }
 
-/* Writes ddmm.mmmmmmm and its letter. The angle is rounded before it is divided, so that the minutes never read 60. */
-static void put_angle(struct sentence *s, double deg, int degree_digits, char positive, char negative)
+/* Writes ddmm.mmmm and its letter. The angle is rounded before it is divided, so that the minutes never read 60. */
+static void put_angle(struct sentence *s, double deg, int degree_digits, int decimals, const char letters[2])
 {
-    const long long degree = 600000000; /* in 1e-7 minutes */
-    long long total = llround(deg * (double)degree);
-    char letter = total < 0 ? negative : positive;
+    long long minute = 1;
+    for (int i = 0; i < decimals; i++)
+        minute *= 10;
+    long long total = llround(deg * (double)(60 * minute));
+    const char letter = letters[total < 0];
     total = llabs(total);
-    long long minutes = total % degree;
-    nmea_put(s, ",%0*lld%02lld.%07lld,%c", degree_digits, total / degree, minutes / 10000000, minutes % 10000000,
-             letter);
+    nmea_put(s, ",%0*lld%02lld.%0*lld,%c", degree_digits, total / (60 * minute), total / minute % 60, decimals,
+             total % minute, letter);
 }
 
-static void put_place(struct sentence *s, const struct nmea_fix *fix)
+static void put_place(struct sentence *s, const struct nmea_fix *fix, int decimals)
 {
     if (fix->quality == 0) {
         nmea_put(s, ",,,,");
         return;
     }
-    put_angle(s, fix->lat_deg, 2, 'N', 'S');
-    put_angle(s, fix->lon_deg, 3, 'E', 'W');
+    put_angle(s, fix->lat_deg, 2, decimals, "NS");
+    put_angle(s, fix->lon_deg, 3, decimals, "EW");
+}
+
+/* The least number of decimals, from 1 to `most`, that are as exact as `most` of them. */
+static int needed_decimals(double value, int most)
+{
+    int n = 1;
+    for (double scaled = 10.0 * value; n < most && fabs(scaled - round(scaled)) > 1e-6; scaled *= 10.0)
+        n++;
+    return n < most ? n : most;
+}
+
+static size_t encode_gga(char *dst, size_t cap, const struct nmea_fix *fix, const struct decimals *decimals)
+{
+    struct sentence s = nmea_begin(dst, cap, fix, "GGA");
+    put_time(&s, fix);
+    put_place(&s, fix, decimals->minutes);
+    if (fix->quality == 0)
+        nmea_put(&s, ",0,00,,,M,,M,,");
+    else
+        nmea_put(&s, ",%d,%02d,%.1f,%.*f,M,%.*f,M,,", fix->quality, fix->satellites, fix->hdop, decimals->others,
+                 fix->altitude_m, needed_decimals(fix->geoid_separation_m, decimals->others), fix->geoid_separation_m);
+    return nmea_end(&s);
 }
 
 size_t nmea_encode_gga(char *dst, size_t cap, const struct nmea_fix *fix)
 {
-    struct sentence s = nmea_begin(dst, cap, fix, "GGA");
-    put_time(&s, fix);
-    put_place(&s, fix);
-    if (fix->quality == 0)
-        nmea_put(&s, ",0,00,,,M,,M,,");
-    else
-        nmea_put(&s, ",%d,%02d,%.1f,%.4f,M,%.4f,M,,", fix->quality, fix->satellites, fix->hdop, fix->altitude_m,
-                 fix->geoid_separation_m);
-    return nmea_end(&s);
+    return encode_within(encode_gga, dst, cap, fix, NMEA_MOST_LEN);
 }
 
-size_t nmea_encode_rmc(char *dst, size_t cap, const struct nmea_fix *fix)
+static size_t encode_rmc(char *dst, size_t cap, const struct nmea_fix *fix, const struct decimals *decimals)
 {
     static const char mode[] = "NADNRF"; /* by quality: not valid, autonomous, differential, -, RTK, RTK float */
     struct sentence s = nmea_begin(dst, cap, fix, "RMC");
     put_time(&s, fix);
     nmea_put(&s, ",%c", fix->quality == 0 ? 'V' : 'A');
-    put_place(&s, fix);
+    put_place(&s, fix, decimals->minutes);
     if (fix->quality == 0)
         nmea_put(&s, ",,");
     else if (isnan(fix->course_deg)) /* readers that use sscanf refuse an empty field */
-        nmea_put(&s, ",%.3f,000.0", fix->speed_m_s / KNOT_M_S);
+        nmea_put(&s, ",%.*f,000.0", decimals->others, fix->speed_m_s / KNOT_M_S);
     else /* rounded down, so that it never reads 360 */
-        nmea_put(&s, ",%.3f,%.2f", fix->speed_m_s / KNOT_M_S, floor(fix->course_deg * 100.0) / 100.0);
+        nmea_put(&s, ",%.*f,%.2f", decimals->others, fix->speed_m_s / KNOT_M_S, floor(fix->course_deg * 100.0) / 100.0);
     nmea_put(&s, ",%02d%02d%02d,,,%c", fix->day, fix->month, fix->year % 100,
              mode[fix->quality >= 0 && fix->quality <= 5 ? fix->quality : 0]);
     return nmea_end(&s);
+}
+
+size_t nmea_encode_rmc(char *dst, size_t cap, const struct nmea_fix *fix)
+{
+    return nmea_encode_rmc_within(dst, cap, fix, NMEA_MOST_LEN);
+}
+
+size_t nmea_encode_rmc_within(char *dst, size_t cap, const struct nmea_fix *fix, size_t most)
+{
+    return encode_within(encode_rmc, dst, cap, fix, most);
 }
 
 /* Single satellites are not modelled, so GSA lists the numbers from 1 on, 12 at most. */

@@ -156,9 +156,10 @@ struct protocol_spec {
     /* 1: the head waits for clients (paces fast and step). Device time then says nothing of how long a client takes, so
      * a protocol sets clients no time limit. */
     int waits;
-    /* velodyne_http: address and port of the link `velodyne`, to which the data go; "" and 0: not known */
+    /* velodyne_http: address and port of the link `velodyne`, to which the data go, and the port of the link
+     * `velodyne-position`; "" and 0: not known */
     char address[64];
-    int port;
+    int port, position_port;
     /* capture: what to say; outlive the instance. NULL for all others */
     const struct talk *talk;
     const struct talk_options *talk_options;

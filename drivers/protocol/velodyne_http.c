@@ -33,7 +33,7 @@ static const struct status {
     {405, "Method Not Allowed", "this path allows another method"},
     {408, "Request Timeout", "a request must be complete within 30 s"},
     {409, "Conflict", ""},
-    {411, "Length Required", "a body must have a Content-Length; chunked bodies are not supported"},
+    {411, "Length Required", "chunked bodies are not supported; a body must have a Content-Length"},
     {413, "Content Too Large", "a body must have at most 1024 bytes"},
     {414, "URI Too Long", "a request line must have at most 512 bytes"},
     {417, "Expectation Failed", "only Expect: 100-continue is supported"},

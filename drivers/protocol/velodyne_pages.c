@@ -89,7 +89,7 @@ static void put_settings(struct page *p)
     velodyne_pages_put(p, "\"phaselock\":{\"enabled\":\"%s\",\"offset\":%u,\"offsetInput\":%g},\"host\":{\"addr\":",
                        on_off(p->state.phase_lock), p->state.offset_cdeg, 0.01 * p->state.offset_cdeg);
     put_string(p, velodyne_host_address(p->spec));
-    velodyne_pages_put(p, ",\"dport\":%d,\"tport\":%d},", velodyne_host_port(p->spec), VELODYNE_POSITION_PORT);
+    velodyne_pages_put(p, ",\"dport\":%d,\"tport\":%d},", velodyne_host_port(p->spec), velodyne_position_port(p->spec));
     velodyne_pages_put(
         p,
         "\"net\":{\"addr\":\"\",\"mask\":\"\",\"gateway\":\"\",\"dhcp\":\"Off\",\"mac_addr\":\"02-00-00-00-00-00\"}}");

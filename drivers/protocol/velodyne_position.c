@@ -12,7 +12,7 @@
  *   0xbe i16 change since then     0xc0 u32 s since then           0xc4 u8 its reason   0xc5 u8 status
  *   0xc6 u32 us since the top of the hour                          0xca u8 enum protocol_pps
  *   0xcb u8 thermal status         0xcc u8 deg C at shut-down      0xcd u8 deg C at power-up
- *   0xce $GPRMC,... CR LF */
+ *   0xce $GPRMC,... CR LF, 72 bytes at most: readers take as many for the sentence */
 enum {
     AT_TOP = 0xbb,
     AT_BOTTOM = 0xbc,
@@ -28,7 +28,7 @@ enum {
 enum { REASON_POWER_ON = 1 };
 /* Warm electronics at rest. No temperature is modelled. */
 enum { TOP_DEGC = 42, BOTTOM_DEGC = 39, ADC_DEGC = 40, POWER_UP_DEGC = 25 };
-enum { MOST_AT_ONCE = 64 };
+enum { MOST_AT_ONCE = 64, SENTENCE_LEN = 72 };
 
 struct position {
     struct protocol_spec spec; /* its power-up counts as the last ADC calibration */
@@ -49,7 +49,7 @@ static void put_sentence(const struct position *p, char *dst, int64_t t_ns)
     struct nmea_fix fix;
     if (!p->spec.host.fix(p->spec.host.ctx, t_ns, &fix)) return;
     memcpy(fix.talker, "GP", 2);
-    memcpy(dst, sentence, nmea_encode_rmc(sentence, sizeof sentence, &fix));
+    memcpy(dst, sentence, nmea_encode_rmc_within(sentence, sizeof sentence, &fix, SENTENCE_LEN));
 }
 
 static void send_packet(const struct position *p, int64_t t_ns)

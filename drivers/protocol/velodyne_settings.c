@@ -64,11 +64,22 @@ static int is_scanning(const struct protocol_spec *spec)
     return state == PROTOCOL_HEAD_SCANNING || state == PROTOCOL_HEAD_SPIN_UP;
 }
 
+/* Starts the scan unless it runs. A head that can't start now is found while the form is checked, so that nothing of
+ * the form is done. */
+static int start(const struct posted *p)
+{
+    const enum protocol_head_state state = protocol_ask_state(&p->spec->host);
+    if (state == PROTOCOL_HEAD_SCANNING || state == PROTOCOL_HEAD_SPIN_UP) return 200;
+    if (state == PROTOCOL_HEAD_IDLE || state == PROTOCOL_HEAD_UNKNOWN) return command(p, "SCAN:START");
+    return refuse(p, 503, "the head can't start now: it boots, spins down or has failed; nothing has changed");
+}
+
 static int set_laser(const struct posted *p, const char *value)
 {
     int on;
     if (!read_switch(value, &on)) return refuse(p, 400, "laser: allowed are on and off");
-    return is_scanning(p->spec) == on ? 200 : command(p, on ? "SCAN:START" : "SCAN:STOP");
+    if (on) return start(p);
+    return is_scanning(p->spec) ? command(p, "SCAN:STOP") : 200;
 }
 
 static const struct {
@@ -118,7 +129,7 @@ static int set_address(const struct posted *p, const char *value)
 
 static int set_port(const struct posted *p, const char *value)
 {
-    const long present = strcmp(p->key, "dport") == 0 ? velodyne_host_port(p->spec) : VELODYNE_POSITION_PORT;
+    const long present = strcmp(p->key, "dport") == 0 ? velodyne_host_port(p->spec) : velodyne_position_port(p->spec);
     long port;
     if (!read_number(value, &port) || port < 1 || port > 65535)
         return refuse(p, 400, "dport, tport: allowed are 1 to 65535");
@@ -180,13 +191,12 @@ static int save(const struct posted *p, const char *value)
 static int reset(const struct posted *p, const char *value)
 {
     if (strcasecmp(value, "reset_system") != 0) return refuse(p, 400, "data: allowed is reset_system");
-    if (!p->apply) return 200;
+    if (!p->apply) return start(p);
     int status = command(p, "HEAD:LINES DEF");
     if (status == 200) status = command(p, "SCAN:ECHOES DEF");
     if (status == 200) status = command(p, "HEAD:PHASE DEF");
     if (status == 200) status = command(p, "HEAD:PHASE:LOCK DEF");
-    if (status == 200 && !is_scanning(p->spec)) status = command(p, "SCAN:START");
-    return status;
+    return status == 200 ? start(p) : status;
 }
 
 static const struct setting {
@@ -278,15 +288,33 @@ static int read_form(const struct posted *p, const char *path, char *form, size_
     return n != 0 ? n : -refuse(p, 400, "the body is not a form: key=value&key=value");
 }
 
+/* The paths that have one meaning. Clients post nothing, the word, or the word as the value of `data` or of itself. */
+static const struct {
+    const char *path, *word;
+} actions[] = {{"/cgi/save", "submit"}, {"/cgi/reset", "reset_system"}};
+
+/* Writes such a form as data=word, which takes at most HTTP_MAX_BODY bytes. Returns the form's new length. */
+static size_t unify(const char *path, char *form, size_t len)
+{
+    for (size_t i = 0; i < sizeof actions / sizeof actions[0]; i++) {
+        const char *word = actions[i].word;
+        const size_t n = strlen(word);
+        const int is_word = len == n && strncasecmp(form, word, n) == 0;
+        const int is_twice = len == 2 * n + 1 && form[n] == '=' && strncasecmp(form, word, n) == 0 &&
+                             strncasecmp(form + n + 1, word, n) == 0;
+        if (strcmp(actions[i].path, path) == 0 && (len == 0 || is_word || is_twice))
+            return (size_t)sprintf(form, "data=%s", word);
+    }
+    return len;
+}
+
 int velodyne_post(const struct protocol_spec *spec, const char *path, const char *form, size_t len, char *text)
 {
     struct pair pairs[N_SETTINGS + 1];
     struct posted posted = {.spec = spec, .text = text};
     char copy[HTTP_MAX_BODY + 1];
     memcpy(copy, form, len);
-    if (len == 0 && strcmp(path, "/cgi/save") == 0) /* a published client posts no body to it */
-        len = (size_t)snprintf(copy, sizeof copy, "data=submit");
-    const int n = read_form(&posted, path, copy, len, pairs);
+    const int n = read_form(&posted, path, copy, unify(path, copy, len), pairs);
     int status = n < 0 ? -n : 200;
     for (; posted.apply < 2; posted.apply++)
         for (int i = 0; i < n && status == 200; i++) {
@@ -336,4 +364,9 @@ const char *velodyne_host_address(const struct protocol_spec *spec)
 int velodyne_host_port(const struct protocol_spec *spec)
 {
     return spec->port != 0 ? spec->port : VELODYNE_DATA_PORT;
+}
+
+int velodyne_position_port(const struct protocol_spec *spec)
+{
+    return spec->position_port != 0 ? spec->position_port : VELODYNE_POSITION_PORT;
 }

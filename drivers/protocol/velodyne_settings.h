@@ -31,8 +31,10 @@ struct velodyne_state {
 /* Asks the head for its present state. */
 void velodyne_read_state(const struct protocol_spec *spec, struct velodyne_state *out);
 
-/* The address that data are sent to, as far as it is known. */
+/* The address and the port that data are sent to, and the port of position packets; the device's own ones where no
+ * link has them. */
 const char *velodyne_host_address(const struct protocol_spec *spec);
 int velodyne_host_port(const struct protocol_spec *spec);
+int velodyne_position_port(const struct protocol_spec *spec);
 
 #endif

@@ -78,10 +78,18 @@ static void identify(struct links *links, const struct config *cfg)
     id->queue_ns = llround(1e6 * cfg->loop.queue_ms);
     config_fill_fields(cfg, &links->fields);
     id->fields = cfg->n_fields + cfg->n_inputs != 0 ? &links->fields : NULL; /* pump_protocol.c: look_back */
+}
+
+/* Finds where the packets of a VLP-16 go: its clients read that from its settings, and post it. The first link wins. */
+static void find_receiver(struct links *links, const struct config *cfg)
+{
     for (uint32_t i = cfg->n_links; i-- > 0;) {
-        if (cfg->link[i].protocol != PROTOCOL_VELODYNE || cfg->link[i].type != LINK_UDP) continue;
-        snprintf(links->data_address, sizeof links->data_address, "%s", cfg->link[i].address);
-        links->data_port = cfg->link[i].port;
+        const struct link_spec *l = &cfg->link[i];
+        if (l->type != LINK_UDP) continue;
+        if (l->protocol == PROTOCOL_VELODYNE_POSITION) links->position_port = l->port;
+        if (l->protocol != PROTOCOL_VELODYNE) continue;
+        snprintf(links->data_address, sizeof links->data_address, "%s", l->address);
+        links->data_port = l->port;
     }
 }
 
@@ -107,6 +115,7 @@ int links_open(struct links *links, const struct config *cfg, const struct link_
 {
     int rc = SH_OK;
     identify(links, cfg);
+    find_receiver(links, cfg);
     for (uint32_t i = 0; i < cfg->n_links + (extra != NULL) && rc == SH_OK; i++) {
         const struct link_spec *spec = i < cfg->n_links ? &cfg->link[i] : extra;
         rc = pump_open(links, i, spec, &links->pump[i], err);

@@ -56,9 +56,9 @@ struct links {
     const struct web_source *web;          /* of links of type web; NULL: none */
     const struct links_observer *observer; /* NULL: none */
     struct protocol_identity identity;
-    struct cola_fields fields; /* of the identity, where there are some */
-    char data_address[64];     /* where the first velodyne link of type udp sends; empty: none */
-    int data_port;
+    struct cola_fields fields;    /* of the identity, where there are some */
+    char data_address[64];        /* where the first velodyne link of type udp sends; empty: none */
+    int data_port, position_port; /* of the first links velodyne and velodyne-position of type udp; 0: none */
 
     struct pump *pump[STREAM_MAX_LINKS];
     uint32_t n;

@@ -205,6 +205,7 @@ static int pump_protocol_create(struct pump *pump, struct session *s, struct sh_
         .shared = &pump->shared,
         .waits = pump->stream->waits,
         .port = pump->links->data_port,
+        .position_port = pump->links->position_port,
     };
     snprintf(spec.address, sizeof spec.address, "%s", pump->links->data_address);
     if (source->ops->talk != NULL) spec.talk = source->ops->talk(source->self, pump->index, &spec.talk_options);

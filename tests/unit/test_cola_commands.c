@@ -251,7 +251,7 @@ static void errors_have_their_numbers(void **state)
         {"sWN EIHstCola +", "sFA 8"},
         {"sEN LMDscandata 2", "sFA 5"},
         {"sEN LMDscandata", "sFA 8"},
-        {"sRN LMDscandata 1", "sFA 7"},
+        {"sEN LMDscandata 1 1", "sFA 7"},
         {"sWN LocationName 11 12345678901234567", "sFA 10"},
         {"sWN LocationName 5 abc", "sFA 8"},
         {"sWN FREchoFilter 3", "sFA 5"},
@@ -265,6 +265,27 @@ static void errors_have_their_numbers(void **state)
     cola_expect("sRN LMPoutputRange", "sRA LMPoutputRange 1 9C4 FFF92230 225510"); /* nothing has changed */
     EXPECT_B("sRN NoSuchVariable", "sFA\0\3");
     EXPECT_B("sWN FREchoFilter \2 ", "sFA\0\7"); /* a blank is a byte, too */
+}
+
+/* PCL's TimGrabber polls with a 1 after the name and two NULs after the telegram: \x02sRN LMDscandata 1\x03\0\0. */
+static void values_of_a_read_are_ignored(void **state)
+{
+    (void)state;
+    static const char poll[] = "\2sRN LMDscandata 1\3\0";
+    cola_open_tim("TiM571");
+    cola_turn(0, 1.0);
+    for (uint32_t i = 0; i < 3; i++) {
+        cola_input(poll, sizeof poll); /* with the second NUL */
+        assert_int_equal(cola.n_units, i + 1);
+        assert_memory_equal(cola.bytes + (i != 0 ? cola.end[i - 1] : 0), "\2sRA LMDscandata ", 17);
+    }
+    assert_int_equal(cola.count[PROTOCOL_INPUT_LOST], 6); /* the NULs */
+    cola_expect("sRN LCMstate 0", "sRA LCMstate 0");
+    cola_expect("sRI0 0", "sRA 0 6 TiM571 5 1.2.3");
+    cola_expect("sRN EIHstCola x y", "sRA EIHstCola 0");
+    cola_expect("sRN NoSuchVariable 1", "sFA 3");
+    EXPECT_B("sRN LCMstate \1\2", "sRA LCMstate \0");
+    assert_int_equal(cola.count[PROTOCOL_WRONG], 1);
 }
 
 static void a_geometry_that_the_head_has_not_is_refused(void **state)
@@ -353,6 +374,7 @@ int main(void)
         CASE(states_follow_the_head),
         CASE(writing_needs_its_level),
         CASE(errors_have_their_numbers),
+        CASE(values_of_a_read_are_ignored),
         CASE(a_geometry_that_the_head_has_not_is_refused),
         CASE(settings_are_kept_and_forgotten),
         CASE(the_clock_can_be_set),

@@ -85,7 +85,7 @@ static void variables_are_written(void **state)
     cola_expect("sWN TSCTCSrvAddr 7F 0 0", "sFA 8");
     cola_expect("sWN TSCTCSrvAddr 7F 0 0 100", "sFA 10");
     cola_expect("sWN TSCTCmaxoffset 468CA000", "sFA A"); /* only read */
-    cola_expect("sRN TSCRole 1", "sFA 7");
+    cola_expect("sWN TSCRole 1 1", "sFA 7");
     replies[2].error = -222;
     cola_expect("sWN TSCTCupdatetime 0", "sFA 5");
     replies[2].error = -221; /* the head can't ask */

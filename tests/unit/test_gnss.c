@@ -74,6 +74,18 @@ struct fix {
     int quality;
 };
 
+/* The sentence has the fix: minutes of 6 decimals or more, and heights of 3. */
+static void check_sentence(const struct nmea_line *line, const struct nmea_fix *known)
+{
+    const double half_step_deg = 0.5e-6 / 60 + 1e-13, half_step_m = 0.5e-3 + 1e-9;
+    if (known->quality == 0) return;
+    assert_true(fabs(read_angle(line->field[2], line->field[3], 2, "NS") - known->lat_deg) <= half_step_deg);
+    assert_true(fabs(read_angle(line->field[4], line->field[5], 3, "EW") - known->lon_deg) <= half_step_deg);
+    assert_true(fabs(atof(line->field[9]) - known->altitude_m) <= half_step_m);
+    assert_true(fabs(atof(line->field[11]) - known->geoid_separation_m) <= half_step_m);
+}
+
+/* Returns the fix without the rounding of its sentence, which is checked, too. */
 static struct fix get_fix(const struct receiver *r, uint64_t index, uint32_t station)
 {
     char text[NMEA_MAX_ALL];
@@ -84,11 +96,12 @@ static struct fix get_fix(const struct receiver *r, uint64_t index, uint32_t sta
     const char *at = strstr(text, "GGA") - 3, *end = strchr(at, '\n') + 1;
     assert_true(len > 0 && at > text);
     read_line(at, (size_t)(end - at), "GNGGA", 15, &line);
-    struct fix fix = {.lat_deg = read_angle(line.field[2], line.field[3], 2, "NS"),
-                      .lon_deg = read_angle(line.field[4], line.field[5], 3, "EW"),
-                      .separation_m = atof(line.field[11]),
+    check_sentence(&line, &known);
+    struct fix fix = {.lat_deg = known.lat_deg,
+                      .lon_deg = known.lon_deg,
+                      .height_m = known.altitude_m + known.geoid_separation_m,
+                      .separation_m = known.geoid_separation_m,
                       .quality = atoi(line.field[6])};
-    fix.height_m = atof(line.field[9]) + fix.separation_m;
     snprintf(fix.time, sizeof fix.time, "%s", line.field[1]);
     return fix;
 }
@@ -115,9 +128,8 @@ static void offset_enu(double lat_deg, double lon_deg, double height_m, const st
     d[2] = cos(lat) * cos(lon) * x + cos(lat) * sin(lon) * y + sin(lat) * z;
 }
 
-/* The bound is half a step of the last digit. 0.5e-7' are 0.093 mm north (a minute is at most 1861.6 m), and as much
- * east at the equator. Two heights of 4 decimals have 0.05 mm each. The coordinates themselves are good to 1e-9 m. */
-#define STEP_M 0.0001
+/* The coordinates are good to 1e-9 m. A double's step of 180 degrees is 3e-14 degrees, or 3e-9 m. */
+#define STEP_M 1e-7
 
 static void check_antenna(const char *lat, const char *lon, const char *heading, const char *arm, const double enu[3])
 {
@@ -201,8 +213,11 @@ static void it_stands_where_the_head_stands(void **state)
     (void)state;
     struct receiver r = open_receiver("10", "20", NULL);
     start_receiver(&r);
-    assert_true(get_fix(&r, 0, 0).lat_deg == 10 && get_fix(&r, 0, 1).lat_deg == 1);
-    assert_true(get_fix(&r, 0, 1).lon_deg == 2 && get_fix(&r, 0, 1).height_m == 3);
+    const struct fix here = get_fix(&r, 0, 0), there = get_fix(&r, 0, 1);
+    const double step_deg = STEP_M / 111000;
+    assert_true(fabs(here.lat_deg - 10) < step_deg && fabs(here.lon_deg - 20) < step_deg);
+    assert_true(fabs(there.lat_deg - 1) < step_deg && fabs(there.lon_deg - 2) < step_deg);
+    assert_true(fabs(there.height_m - 3) < STEP_M);
     close_receiver(&r);
 }
 

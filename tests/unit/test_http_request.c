@@ -64,7 +64,6 @@ static void test_broken_requests(void **state)
         {"GET /cgi/info.json HTTP/1.1\r\nHost: x\r\nExpect: tea\r\n\r\n", 417, 1},
         {"GET /cgi/info.json HTTP/1.1\r\nHost: x\r\nExpect: tea\r\nExpect: 100-continue\r\n\r\n", 417, 1},
         {"GET /cgi/info.json HTTP/1.1\r\nHost: x\r\nOrigin: http://y\r\nOrigin: http://x\r\n\r\n", 400, 1},
-        {"POST /cgi/setting HTTP/1.1\r\nHost: x\r\n\r\nrpm=600", 411, 1},
         {"POST /cgi/setting HTTP/1.1\r\nHost: x\r\nTransfer-Encoding: chunked\r\n\r\n7\r\nrpm=600\r\n0\r\n\r\n", 411,
          1},
         {"POST /cgi/setting HTTP/1.1\r\nHost: x\r\nContent-Length: 7\r\nTransfer-Encoding: x\r\n\r\nrpm=600", 411, 1},
@@ -76,6 +75,8 @@ static void test_broken_requests(void **state)
         {long_head, 431, 1},
         {"GET /cgi/setting HTTP/1.1\r\nHost: x\r\n\r\n", 405, 0},
         {"POST /cgi/info.json HTTP/1.1\r\nHost: x\r\nContent-Length: 0\r\n\r\n", 405, 0},
+        {"POST /cgi/setting HTTP/1.1\r\nHost: x\r\n\r\n", 400, 0}, /* no body, and so no form */
+        {"POST /cgi/setting HTTP/1.0\r\nConnection: keep-alive\r\n\r\n", 400, 0},
         {"OPTIONS /cgi/setting HTTP/1.1\r\nHost: x\r\n\r\n", 405, 0},
         {"GET / HTTP/1.1\r\nHost: x\r\n\r\n", 404, 0},
         {"GET /cgi/info.json HTTP/1.0\r\n\r\n", 200, 1},
@@ -105,6 +106,24 @@ static void test_broken_requests(void **state)
         http_send("abc");
         assert_int_equal(http_rig.count[PROTOCOL_INPUT_LOST] - lost, 3);
     }
+}
+
+/* RFC 9112, 6.3: without Transfer-Encoding and Content-Length a request's body has the length 0. `curl -X POST` sends
+ * that. What comes after the head is the next request. */
+static void test_no_length(void **state)
+{
+    (void)state;
+    static const char get[] = "GET /cgi/none HTTP/1.1\r\nHost: x\r\n\r\n";
+    char text[256];
+    snprintf(text, sizeof text, "POST /cgi/save HTTP/1.1\r\nHost: 127.0.0.1\r\nAccept: */*\r\n\r\n%s", get);
+    http_send(text);
+    assert_memory_equal(http_answer(), done, sizeof done - 1);
+    assert_int_equal(strncmp(http_answer() + sizeof done - 1, "HTTP/1.1 404 ", 13), 0);
+    http_send("POST /cgi/setting HTTP/1.1\r\nHost: x\r\n\r\nrpm=600");
+    assert_int_equal(http_status(), 400);
+    assert_non_null(strstr(http_answer(), "this is not a request of HTTP/1.1")); /* the second answer */
+    http_assert_command(NULL);
+    assert_int_equal(http_rig.hung_up, 1);
 }
 
 /* A line of 512 bytes without its end, a head of 4096 bytes with its end, and a body of 1024 bytes are the longest. */
@@ -270,6 +289,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         TEST(test_pieces),
         TEST(test_broken_requests),
+        TEST(test_no_length),
         cmocka_unit_test(test_lists),
         TEST(test_head_method),
         TEST(test_longest),

@@ -84,11 +84,13 @@ static void protocols_know_the_head_and_its_data_link(void **state)
     cfg->profile.arrangement.geometry[0].steps_per_turn = 1080;
     cfg->profile.arrangement.geometry[1].lines_uhz = 25000000;
     cfg->profile.arrangement.geometry[1].steps_per_turn = 720;
-    cfg->n_links = 4;
+    cfg->n_links = 6;
     cfg->link[0] = (struct link_spec){.type = LINK_UDP, .protocol = PROTOCOL_VELODYNE, .port = 4001};
     cfg->link[1] = (struct link_spec){.type = LINK_UDP, .protocol = PROTOCOL_VELODYNE, .port = 4002};
     cfg->link[2] = (struct link_spec){.type = LINK_UDP, .protocol = PROTOCOL_VELODYNE_POSITION, .port = 9};
     cfg->link[3] = (struct link_spec){.type = LINK_NULL, .protocol = PROTOCOL_VELODYNE, .port = 4003};
+    cfg->link[4] = (struct link_spec){.type = LINK_UDP, .protocol = PROTOCOL_VELODYNE_POSITION, .port = 10};
+    cfg->link[5] = (struct link_spec){.type = LINK_NULL, .protocol = PROTOCOL_VELODYNE_POSITION, .port = 11};
     strcpy(cfg->link[0].address, "127.0.0.2");
     strcpy(cfg->link[1].address, "127.0.0.3");
     struct loop *loop = open_links(cfg, &err);
@@ -96,6 +98,7 @@ static void protocols_know_the_head_and_its_data_link(void **state)
     const struct links *links = &loop->links;
     assert_string_equal(links->data_address, "127.0.0.2");
     assert_int_equal(links->data_port, 4001);
+    assert_int_equal(links->position_port, 9);
     const struct protocol_identity *id = &links->identity;
     assert_string_equal(id->maker, "Maker");
     assert_string_equal(id->model, "Model");

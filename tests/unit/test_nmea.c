@@ -68,7 +68,7 @@ static void the_example_comes_out(void **state)
     (void)state;
     encode(nmea_encode_gga, "GPGGA", 15);
     static const char *const gga[] = {"123519.00", "4807.0380000", "N", "01131.0000000", "E", "1", "08",
-                                      "0.9",       "545.4000",     "M", "46.9000",       "M", "",  ""};
+                                      "0.9",       "545.400",      "M", "46.9",          "M", "",  ""};
     for (int i = 0; i < 14; i++)
         assert_string_equal(line.field[i + 1], gga[i]);
     encode(nmea_encode_rmc, "GPRMC", 13);
@@ -188,6 +188,86 @@ static void qualities(void **state)
     }
 }
 
+/* NMEA 0183: at most 82 characters with "$" and CR LF. libnmea drops longer ones, and the example of minmea those of
+ * more than 81. A row with fewer decimals than the row before would have 82 to 84 characters with as many. */
+static void decimals_leave_where_a_sentence_is_too_long(void **state)
+{
+    (void)state;
+    static const struct {
+        double altitude_m, separation_m, hdop;
+        const char *sentence; /* without its checksum and end, which are 5 characters */
+    } rows[] = {
+        {500, 0, 0.7, "$GPGGA,123519.00,4807.0380000,N,01131.0000000,E,1,08,0.7,500.000,M,0.0,M,,"},
+        {999.9994, 46.9, 0.7, "$GPGGA,123519.00,4807.0380000,N,01131.0000000,E,1,08,0.7,999.999,M,46.9,M,,"},
+        {1000, 46.9, 0.7, "$GPGGA,123519.00,4807.0380000,N,01131.0000000,E,1,08,0.7,1000.000,M,46.9,M,,"},
+        {1000, 46.95, 0.7, "$GPGGA,123519.00,4807.038000,N,01131.000000,E,1,08,0.7,1000.000,M,46.95,M,,"},
+        {-1234.5, 46.9, 0.7, "$GPGGA,123519.00,4807.038000,N,01131.000000,E,1,08,0.7,-1234.500,M,46.9,M,,"},
+        {-1234.5, -105.125, 0.7, "$GPGGA,123519.00,4807.03800,N,01131.00000,E,1,08,0.7,-1234.50,M,-105.12,M,,"},
+        {-1234.5, -105.125, 99.9, "$GPGGA,123519.00,4807.03800,N,01131.00000,E,1,08,99.9,-1234.50,M,-105.12,M,,"},
+        {-12345.678, -119.125, 99.9, "$GPGGA,123519.00,4807.0380,N,01131.0000,E,1,08,99.9,-12345.68,M,-119.12,M,,"},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        char text[NMEA_MAX_SENTENCE];
+        fix.altitude_m = rows[i].altitude_m;
+        fix.geoid_separation_m = rows[i].separation_m;
+        fix.hdop = rows[i].hdop;
+        const size_t len = nmea_encode_gga(text, sizeof text, &fix);
+        read_line(text, len, "GPGGA", 15, &line); /* the checksum */
+        assert_int_equal(len, strlen(rows[i].sentence) + 5);
+        assert_memory_equal(text, rows[i].sentence, len - 5);
+        assert_true(len <= 81);
+    }
+}
+
+static size_t short_rmc(char *dst, size_t cap, const struct nmea_fix *at)
+{
+    return nmea_encode_rmc_within(dst, cap, at, 72);
+}
+
+/* 72 characters with CR LF are what clients of a VLP-16 read. The speed costs decimals of minutes. */
+static void a_short_rmc_has_its_length(void **state)
+{
+    (void)state;
+    static const double speeds_m_s[] = {0, 0.001, 3, 33, 340, 7800, 123456};
+    for (size_t i = 0; i < sizeof speeds_m_s / sizeof *speeds_m_s; i++) {
+        fix.speed_m_s = speeds_m_s[i];
+        fix.course_deg = i == 0 ? NAN : 359.99;
+        encode(short_rmc, "GPRMC", 13);
+        const int decimals = i == 0 ? 5 : i < 6 ? 4 : 3;
+        const double step_deg = pow(10, -decimals) / 60, knots = strtod(line.field[7], NULL);
+        assert_int_equal(strlen(strchr(line.field[3], '.') + 1), decimals);
+        assert_true(fabs(read_angle(line.field[3], line.field[4], 2, "NS") - fix.lat_deg) <= 0.5 * step_deg + 1e-13);
+        assert_true(fabs(knots * 1852 / 3600 - fix.speed_m_s) <= (fix.speed_m_s < 500 ? 0.03 : 0.3));
+        char text[NMEA_MAX_SENTENCE];
+        assert_in_range(short_rmc(text, sizeof text, &fix), 60, 72);
+    }
+}
+
+/* No value that a head can have makes a sentence longer than 81 characters. */
+static void no_sentence_is_too_long(void **state)
+{
+    (void)state;
+    static const double heights_m[] = {0, -0.0004, 99.9999, 8848.86, -10984, 400000},
+                        separations_m[] = {0, -120, 119.9}, speeds_m_s[] = {0, 0.5, 99, 7800}, dops[] = {0.1, 99.9};
+    char text[NMEA_MAX_ALL];
+    fix.satellites = 99;
+    fix.course_deg = 359.99;
+    fix.lat_deg = -89.999999;
+    fix.lon_deg = -179.999999;
+    for (int i = 0; i < 3; i++)
+        fix.sigma_m[i] = 1000; /* the greatest gnss.accuracy_m */
+    for (size_t i = 0; i < 6 * 3 * 4 * 2; i++) {
+        fix.altitude_m = heights_m[i % 6];
+        fix.geoid_separation_m = separations_m[i / 6 % 3];
+        fix.speed_m_s = speeds_m_s[i / 18 % 4];
+        fix.hdop = dops[i / 72];
+        const size_t len = nmea_encode_all(text, sizeof text, &fix);
+        assert_true(len != 0);
+        for (const char *at = text; at < text + len; at = strchr(at, '\n') + 1)
+            assert_in_range(strchr(at, '\n') + 1 - at, 20, 81);
+    }
+}
+
 /* The longest sentences fit. With less room the call returns 0, and writes nothing beyond the end. */
 static void room_is_kept(void **state)
 {
@@ -227,6 +307,9 @@ int main(void)
         cmocka_unit_test_setup(leap_second_and_hundredths, setup),
         cmocka_unit_test_setup(speed_and_course, setup),
         cmocka_unit_test_setup(qualities, setup),
+        cmocka_unit_test_setup(decimals_leave_where_a_sentence_is_too_long, setup),
+        cmocka_unit_test_setup(a_short_rmc_has_its_length, setup),
+        cmocka_unit_test_setup(no_sentence_is_too_long, setup),
         cmocka_unit_test_setup(room_is_kept, setup),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

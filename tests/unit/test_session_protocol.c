@@ -9,11 +9,13 @@ static void a_protocol_learns_of_its_head(void **state)
     strcpy(stored, "kept\n");
     strcpy(links.data_address, "127.0.0.9");
     links.data_port = 77;
+    links.position_port = 78;
     pump.dialect = PROTOCOL_COLA_B;
     open_session();
     expect_log("create kept\n|open 0|");
     assert_true(spec.power_ns == 4 * TICK_NS && spec.power_ons == 3 && spec.near_wrap == 9 && spec.keeps);
-    assert_true(spec.dialect == PROTOCOL_COLA_B && spec.port == 77 && !spec.waits && spec.talk == NULL);
+    assert_true(spec.dialect == PROTOCOL_COLA_B && spec.port == 77 && spec.position_port == 78);
+    assert_true(!spec.waits && spec.talk == NULL);
     assert_string_equal(spec.address, "127.0.0.9");
     assert_ptr_equal(spec.identity, &links.identity);
     assert_ptr_equal(spec.shared, &pump.shared);

@@ -113,8 +113,17 @@ static void test_settings(void **state)
         {"/cgi/setting/phaselock", "offset=nan", 400, NULL},
         {"/cgi/save", "data=submit", 200, NULL},
         {"/cgi/save", "data=SUBMIT", 200, NULL},
+        {"/cgi/save", "", 200, NULL},
+        {"/cgi/save", "submit", 200, NULL}, /* Nebula */
+        {"/cgi/save", "submit=submit", 200, NULL},
         {"/cgi/save", "data=x", 400, NULL},
+        {"/cgi/save", "submit=x", 400, NULL},
+        {"/cgi/save", "reset_system", 400, NULL},
+        {"/cgi/save", "submit&data=submit", 400, NULL},
         {"/cgi/reset", "data=x", 400, NULL},
+        {"/cgi/reset", "reset_system=1", 400, NULL},
+        {"/cgi/reset", "submit", 400, NULL},
+        {"/cgi/setting", "submit", 400, NULL},
     };
     uint64_t wrong = 0;
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
@@ -125,6 +134,22 @@ static void test_settings(void **state)
         assert_int_equal(http_rig.count[PROTOCOL_WRONG], wrong);
     }
     assert_int_equal(http_rig.hung_up, 0);
+}
+
+/* Clients post the host that they have read. The links have other ports than the device. */
+static void test_host_of_the_links(void **state)
+{
+    (void)state;
+    strcpy(http_rig.spec.address, "127.0.0.1");
+    http_rig.spec.port = 40368;
+    http_rig.spec.position_port = 41308;
+    http_renew();
+    http_get("/cgi/settings.json");
+    assert_non_null(strstr(http_body(), "\"host\":{\"addr\":\"127.0.0.1\",\"dport\":40368,\"tport\":41308},"));
+    http_post("/cgi/setting/host", "addr=127.0.0.1&dport=40368&tport=41308");
+    assert_int_equal(http_status(), 200);
+    http_post("/cgi/setting/host", "tport=8308");
+    assert_int_equal(http_status(), 409);
 }
 
 /* Where the head keeps settings, /cgi/save has it do so; a head that another session controls can't. */
@@ -190,20 +215,49 @@ static void test_head_at_rest(void **state)
     assert_non_null(strstr(http_body(), "\"laser\":{\"state\":\"Off\"}"));
 }
 
+/* A head that spins down can't start. It says so before anything of the form is done. */
+static void test_start_during_spin_down(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *path, *form;
+    } cases[] = {{"/cgi/reset", "data=reset_system"}, {"/cgi/setting", "rpm=900&laser=on"}};
+    static const char *const states[] = {"boot", "spin-down", "fault"};
+    for (size_t i = 0; i < 6; i++) {
+        http_replies[0].reply = states[i / 2];
+        http_post(cases[i % 2].path, cases[i % 2].form);
+        assert_int_equal(http_status(), 503);
+        http_assert_command(NULL);
+    }
+}
+
 static void test_reset(void **state)
 {
     (void)state;
     http_post("/cgi/reset", "data=reset_system");
     assert_int_equal(http_status(), 200);
-    assert_string_equal(http_rig.line[0], "HEAD:LINES DEF");
-    assert_string_equal(http_rig.line[1], "SCAN:ECHOES DEF");
-    assert_string_equal(http_rig.line[2], "HEAD:PHASE DEF");
-    assert_string_equal(http_rig.line[3], "HEAD:PHASE:LOCK DEF");
-    assert_string_equal(http_rig.line[4], "HEAD:STATE?");
-    assert_int_equal(http_rig.n_lines, 5);
+    assert_string_equal(http_rig.line[0], "HEAD:STATE?");
+    assert_string_equal(http_rig.line[1], "HEAD:LINES DEF");
+    assert_string_equal(http_rig.line[2], "SCAN:ECHOES DEF");
+    assert_string_equal(http_rig.line[3], "HEAD:PHASE DEF");
+    assert_string_equal(http_rig.line[4], "HEAD:PHASE:LOCK DEF");
+    assert_string_equal(http_rig.line[5], "HEAD:STATE?");
+    assert_int_equal(http_rig.n_lines, 6);
     http_replies[0].reply = "idle";
     http_post("/cgi/reset", "data=Reset_System");
-    assert_string_equal(http_rig.line[5], "SCAN:START");
+    assert_string_equal(http_rig.line[6], "SCAN:START");
+}
+
+/* Nebula posts the word alone, lv_velodyne nothing, and others the word as the value of itself. */
+static void test_forms_of_reset(void **state)
+{
+    (void)state;
+    static const char *const forms[] = {"", "reset_system", "reset_system=reset_system", "RESET_SYSTEM"};
+    for (size_t i = 0; i < sizeof forms / sizeof forms[0]; i++) {
+        http_post("/cgi/reset", forms[i]);
+        assert_int_equal(http_status(), 200);
+        assert_string_equal(http_rig.line[1], "HEAD:LINES DEF");
+    }
 }
 
 /* The head's refusal is passed on with its words, and the rest of the form is not carried out. */
@@ -331,10 +385,21 @@ static void test_names_are_escaped(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        TEST(test_curl),         TEST(test_mrpt),     TEST(test_urllib),
-        TEST(test_settings),     TEST(test_save),     TEST(test_idle_clients),
-        TEST(test_head_at_rest), TEST(test_reset),    TEST(test_refused_by_the_head),
-        TEST(test_documents),    TEST(test_snapshot), TEST(test_names_are_escaped),
+        TEST(test_curl),
+        TEST(test_mrpt),
+        TEST(test_urllib),
+        TEST(test_settings),
+        TEST(test_host_of_the_links),
+        TEST(test_save),
+        TEST(test_idle_clients),
+        TEST(test_head_at_rest),
+        TEST(test_start_during_spin_down),
+        TEST(test_reset),
+        TEST(test_forms_of_reset),
+        TEST(test_refused_by_the_head),
+        TEST(test_documents),
+        TEST(test_snapshot),
+        TEST(test_names_are_escaped),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -59,7 +59,7 @@ static void open_again(int64_t t_ns)
 static void test_fields(void **state)
 {
     (void)state;
-    static const char rmc[] = "$GPRMC,030405.00,A,3351.4070640,S,15112.9178020,E,1.944,90.00,020126,,,R*";
+    static const char rmc[] = "$GPRMC,030405.00,A,3351.40706,S,15112.91780,E,1.94,90.00,020126,,,R*";
     uint8_t want[512] = {0};
     rig.utc0_ns = INT64_C(1767323040000000000); /* 2026-01-02 03:04:00 */
     rig.ops->time(rig.protocol, 1);             /* the packet of device time 0 */
@@ -88,6 +88,7 @@ static void test_fields(void **state)
     static const char hex[] = "0123456789ABCDEF";
     const char end[] = {hex[sum >> 4], hex[sum & 15], '\r', '\n', 0};
     assert_string_equal(text + sizeof rmc - 1, end);
+    assert_int_equal(strlen(text), 72); /* the field's length in the structures of published readers */
 }
 
 /* Checks the states of the pulses, and the time: UTC once it was set, before it the time since power-up. */

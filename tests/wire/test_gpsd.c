@@ -151,9 +151,10 @@ static double number(const char *line, const char *key)
     return value;
 }
 
-/* The bound is half a step of the sentence, 0.5e-7', and half of gpsd's nine decimals: 0.15 mm on the ground. Two
- * heights of four decimals go in, and one comes out. Together that is 0.26 mm, and the promise is 1 mm. */
-static const double ANGLE_TOLERANCE_DEG = 0.5e-7 / 60 + 0.5e-9 + 1e-12, HEIGHT_TOLERANCE_M = 3 * 0.5e-4 + 1e-9;
+/* The bound is half a step of the sentence, 0.5e-7', and half of gpsd's nine decimals: 0.15 mm on the ground. A height
+ * of three decimals goes in, and one of four comes out; the separation is 0. Together that is 0.61 mm, and the promise
+ * is 1 mm. */
+static const double ANGLE_TOLERANCE_DEG = 0.5e-7 / 60 + 0.5e-9 + 1e-12, HEIGHT_TOLERANCE_M = 0.5e-3 + 0.5e-4 + 1e-9;
 
 /* Status as gpsd_json(5) of 3.2x defines it: 1 a fix (left out), 2 DGPS, 3 RTK fixed, 4 RTK float. */
 static void check_gpsd(struct wire *wire, int quality, int status)
