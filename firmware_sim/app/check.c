@@ -227,13 +227,13 @@ static void check_warn(void *ctx, const char *text)
 {
     struct check_run *run = ctx;
     run->n_warnings++;
-    app_report_stderr.warn(app_report_stderr.ctx, text);
+    sh_warn(&app_report_stderr, "%s", text);
 }
 
 static int check(struct config *cfg, void *ctx, struct sh_err *err)
 {
     struct check_run *run = ctx;
-    const struct sh_report report = {run, check_warn, app_report_stderr.progress, app_report_stderr.stop};
+    const struct sh_report report = {.ctx = run, .warn = check_warn, .rest = &app_report_stderr};
     struct sites sites = {0};
     FILE *out = run->csv != NULL && strcmp(run->csv, "-") == 0 ? stderr : stdout; /* CSV alone is on standard output */
     int rc = sites_load(cfg, SITE_FOR_SCANS, &report, &sites, err);

@@ -11,7 +11,6 @@
 /* ---- warnings.c: keeps the warnings given, so that a site beside this one only gives new ones */
 struct site_listener {
     struct sh_report report; /* pass this one to the steps of loading */
-    const struct sh_report *to;
     struct site_warnings *given;
     const struct site_warnings *before;
 };
