@@ -37,17 +37,6 @@ static int keep_some(struct scene_copied *of, const uint8_t *keep, const uint16_
     return SH_OK;
 }
 
-static int bound(struct scene *scene, struct scene_copied *of, struct sh_err *err)
-{
-    struct scene_hull hull;
-    const int rc = scene_find_hull(of->mesh, &hull, err);
-    for (uint32_t k = 0; k < of->n && rc == SH_OK; k++)
-        scene_set_copy_bounds(of->mesh, &hull, &of->copy[k]);
-    if (rc == SH_OK) scene_widen(scene, of->copy, of->n);
-    scene_free_hull(&hull);
-    return rc;
-}
-
 int scene_keep_copies(struct scene *scene, const uint8_t *keep, const uint16_t *label, struct sh_err *err)
 {
     const uint32_t was = scene->n_copied;
@@ -65,7 +54,7 @@ int scene_keep_copies(struct scene *scene, const uint8_t *keep, const uint16_t *
         }
         rc = keep_some(of, keep, label, &kept, err);
         if (rc == SH_OK && kept != NULL) rc = scene_keep(of->mesh, kept, err);
-        if (rc == SH_OK && kept != NULL) rc = bound(scene, of, err);
+        if (rc == SH_OK && kept != NULL) rc = scene_bound_copies(scene, of->mesh, of->copy, of->n, NULL, err);
         if (rc != SH_OK || kept == NULL || of->mesh->n_all == 0) continue;
         of->first = scene->n_all;
         scene->n_all += of->n * of->mesh->n_triangles;
