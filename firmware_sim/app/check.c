@@ -91,11 +91,10 @@ static void print_platform(const struct site *site, FILE *out)
 
 static double bytes_of(const struct scene *scene, const struct bvh *bvh)
 {
-    struct bvh_info info;
-    bvh_get_info(bvh, &info);
     const double triangle =
         sizeof *scene->triangle + sizeof *scene->label + (scene->uv != NULL ? sizeof *scene->uv : 0);
-    double bytes = (double)info.bytes + scene->n_copies * (double)sizeof(struct scene_copy); /* with the meshes' BVHs */
+    double bytes = (double)bvh_get_info(bvh)->bytes; /* with the meshes' BVHs */
+    bytes += scene->n_copies * (double)sizeof(struct scene_copy);
     for (uint32_t i = 0; i <= scene->n_copied; i++) {
         const struct scene *mesh = i == 0 ? scene : scene->copied[i - 1].mesh;
         bytes += mesh->n_triangles * triangle + mesh->n_vertices * (double)sizeof *mesh->vertex_m;
