@@ -6,11 +6,6 @@
 #include "core/scene/copies.h"
 #include "core/scene/hull.h"
 
-static int keeps_any(const uint8_t *keep, uint32_t n)
-{
-    return memchr(keep, 1, n) != NULL;
-}
-
 /* Keeps the copies that keep some surface, with new labels. kept: the surfaces of the mesh that they
  * keep. */
 static int keep_some(struct scene_copied *of, const uint8_t *keep, const uint16_t *label, const uint8_t **kept,
@@ -20,8 +15,8 @@ static int keep_some(struct scene_copied *of, const uint8_t *keep, const uint16_
     uint32_t n = 0;
     *kept = NULL;
     for (uint32_t k = 0; k < of->n; k++) {
-        const uint8_t *here = keep + of->copy[k].label0;
-        if (!keeps_any(here, surfaces)) continue;
+        const uint8_t *here = keep + of->copy[k].label0, *first = memchr(here, 1, surfaces);
+        if (first == NULL) continue;
         if (*kept == NULL) *kept = here;
         if (memcmp(*kept, here, surfaces) != 0)
             return sh_fail(
@@ -30,8 +25,7 @@ static int keep_some(struct scene_copied *of, const uint8_t *keep, const uint16_
                 "patterns that fit the same objects of each copy",
                 k + 1);
         of->copy[n] = of->copy[k];
-        of->copy[n++].label0 =
-            label[of->copy[k].label0 + (uint32_t)((const uint8_t *)memchr(here, 1, surfaces) - here)];
+        of->copy[n++].label0 = label[first - keep];
     }
     of->n = n;
     return SH_OK;

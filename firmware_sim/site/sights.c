@@ -155,7 +155,7 @@ int site_open_sights(struct site *site, uint32_t first, uint32_t n, const struct
     return rc;
 }
 
-void site_close_sights(struct site *site)
+void site_retire(const struct site *site)
 {
     for (uint32_t i = 0; i < site->n_stations; i++)
         close_sight(&site->station[i]);
