@@ -40,10 +40,10 @@ void bvh_set_packet(struct bvh *bvh, uint32_t rays);
 /* This machine's engine, in words: Embree's version, rays a packet, instructions. On machines with the same words, the
  * same rays hit the same triangles. SH_ENOMEM and SH_EIO as bvh_create has them; text is then empty. */
 int bvh_engine(char *text, size_t len, struct sh_err *err);
-void bvh_get_info(const struct bvh *bvh, struct bvh_info *info);
+const struct bvh_info *bvh_get_info(const struct bvh *bvh);
 /* The origin of the local frame: the middle of the scene, or where most triangles of a large scene without copies
  * are. */
-void bvh_origin(const struct bvh *bvh, double origin_m[3]);
+const double *bvh_origin(const struct bvh *bvh);
 const struct scene *bvh_scene(const struct bvh *bvh);
 
 /* The plane of a triangle in the local frame: its points p have n . p = d. n is e1 x e2: its length is
@@ -141,8 +141,9 @@ void bvh_work_set_directions(struct bvh_work *work, const struct vec3_in *dir, u
  * that it begins on. tests/accuracy measures the error of ranges. Allocates nothing. */
 void bvh_hits(struct bvh_work *work, const struct bvh *bvh, const struct bvh_rays *rays);
 
-/* The range of one ray's first hit within 1e9 m; NaN: none. */
-double bvh_ray(struct bvh_work *work, const struct bvh *bvh, const double at_m[3], const double dir[3]);
+/* The range of one ray's first hit within 1e9 m; NaN: none. For single rays: it has working memory of its own, 70 kB on
+ * the stack. */
+double bvh_ray(const struct bvh *bvh, const double at_m[3], const double dir[3]);
 
 /* ---- for rays from one point whose triangles are known from elsewhere (core/sight); not for scenes with
  * holes. */

@@ -39,7 +39,9 @@ int sh_fail(struct sh_err *err, int code, const char *fmt, ...)
 
 void sh_warn(const struct sh_report *report, const char *fmt, ...)
 {
-    if (report == NULL || report->warn == NULL) return;
+    while (report != NULL && report->warn == NULL)
+        report = report->rest;
+    if (report == NULL) return;
     char text[512];
     va_list ap;
     va_start(ap, fmt);
@@ -51,12 +53,16 @@ void sh_warn(const struct sh_report *report, const char *fmt, ...)
 
 void sh_progress(const struct sh_report *report, const char *what, double fraction)
 {
-    if (report != NULL && report->progress != NULL) report->progress(report->ctx, what, fraction);
+    while (report != NULL && report->progress == NULL)
+        report = report->rest;
+    if (report != NULL) report->progress(report->ctx, what, fraction);
 }
 
 int sh_stopped(const struct sh_report *report)
 {
-    return report != NULL && report->stop != NULL && report->stop(report->ctx);
+    while (report != NULL && report->stop == NULL)
+        report = report->rest;
+    return report != NULL && report->stop(report->ctx);
 }
 
 int sh_fail_stopped(struct sh_err *err)

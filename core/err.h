@@ -38,8 +38,8 @@ int sh_fail(struct sh_err *err, int code, const char *fmt, ...) __attribute__((f
  * within a character. */
 void sh_keep_line(char *text);
 
-/* Receives the reports of long work. Each member may be NULL. warn and progress are called from the
- * thread that does the work. */
+/* Receives the reports of long work. Each member may be NULL: `rest` then receives these reports, if there is one. warn
+ * and progress are called from the thread that does the work. */
 struct sh_report {
     void *ctx;
     void (*warn)(void *ctx, const char *text);                      /* one line, without a newline */
@@ -47,6 +47,7 @@ struct sh_report {
     /* 1: the work is to end; then it is 1 at every later call. Called from any thread of the work, and often:
      * it only reads a flag. */
     int (*stop)(void *ctx);
+    const struct sh_report *rest; /* must outlive this one */
 };
 
 void sh_warn(const struct sh_report *report, const char *fmt, ...) __attribute__((format(printf, 2, 3)));

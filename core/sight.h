@@ -57,7 +57,7 @@ double sight_examined(const struct sight_spec *spec);
 int sight_create(const struct sight_spec *spec, unsigned threads, const struct sh_report *report, struct sight **out,
                  struct sh_err *err);
 void sight_free(struct sight *sight);
-void sight_get_info(const struct sight *sight, struct sight_info *info);
+const struct sight_info *sight_get_info(const struct sight *sight);
 
 /* How often the cell of a ray did not give the answer by itself. */
 struct sight_counters {

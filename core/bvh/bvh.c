@@ -3,7 +3,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "core/bvh/meet.h"
 #include "core/monotonic.h"
@@ -132,9 +131,9 @@ void bvh_free(struct bvh *bvh)
     free(bvh);
 }
 
-void bvh_get_info(const struct bvh *bvh, struct bvh_info *info)
+const struct bvh_info *bvh_get_info(const struct bvh *bvh)
 {
-    *info = bvh->info;
+    return &bvh->info;
 }
 
 void bvh_set_packet(struct bvh *bvh, uint32_t rays)
@@ -142,9 +141,9 @@ void bvh_set_packet(struct bvh *bvh, uint32_t rays)
     bvh->info.packet = embree_has_packet(bvh->device, rays) ? rays : 1;
 }
 
-void bvh_origin(const struct bvh *bvh, double origin_m[3])
+const double *bvh_origin(const struct bvh *bvh)
 {
-    memcpy(origin_m, bvh->origin_m, sizeof bvh->origin_m);
+    return bvh->origin_m;
 }
 
 const struct scene *bvh_scene(const struct bvh *bvh)

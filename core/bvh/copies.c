@@ -187,12 +187,8 @@ static void leave(struct bvh_query *query, const struct bvh_copy *copy, float *t
     query->counters.leaves += in->counters.leaves;
     query->counters.decided += in->counters.decided;
     for (uint32_t i = 0; in->counters.decided != 0 && i < query->width; i++) {
-        const uint32_t triangle = copy->first + in->near[i];
-        const double range_m = in->near_m[i] * scale;
-        if (!nested->valid[i] || in->near[i] == BVH_NO_TRIANGLE || range_m > query->near_m[i]) continue;
-        if (range_m == query->near_m[i] && triangle > query->near[i]) continue;
-        query->near_m[i] = range_m;
-        query->near[i] = triangle;
+        if (!nested->valid[i] || in->near[i] == BVH_NO_TRIANGLE) continue;
+        bvh_note_miss(query, i, copy->first + in->near[i], in->near_m[i] * scale);
     }
 }
 

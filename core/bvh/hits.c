@@ -23,12 +23,17 @@ struct bvh_work {
     struct bvh_profile *profile;
 };
 
+static void begin_work(struct bvh_work *w)
+{
+    memset(w, 0, sizeof *w);
+    w->query.nested = &w->nested;
+}
+
 int bvh_work_create(struct bvh_work **out, struct sh_err *err)
 {
     struct bvh_work *w = *out = aligned_alloc(64, (sizeof *w + 63) / 64 * 64);
     if (w == NULL) return sh_fail(err, SH_ENOMEM, "bvh: no memory");
-    memset(w, 0, sizeof *w);
-    w->query.nested = &w->nested;
+    begin_work(w);
     return SH_OK;
 }
 
@@ -181,8 +186,9 @@ void bvh_hits(struct bvh_work *work, const struct bvh *bvh, const struct bvh_ray
     }
 }
 
-double bvh_ray(struct bvh_work *work, const struct bvh *bvh, const double at_m[3], const double dir[3])
+double bvh_ray(const struct bvh *bvh, const double at_m[3], const double dir[3])
 {
+    struct bvh_work work;
     double range_m;
     uint32_t triangle;
     const struct bvh_rays ray = {.n = 1,
@@ -192,6 +198,7 @@ double bvh_ray(struct bvh_work *work, const struct bvh *bvh, const double at_m[3
                                  .scattered = 1,
                                  .range_m = &range_m,
                                  .triangle = &triangle};
-    bvh_hits(work, bvh, &ray);
+    begin_work(&work);
+    bvh_hits(&work, bvh, &ray);
     return range_m;
 }

@@ -43,18 +43,16 @@ static uint32_t length_bits(double length_m)
     return (float_bits(above(length_m)) + (UINT32_C(1) << BVH_LENGTH_BITS) - 1) >> BVH_LENGTH_BITS;
 }
 
-/* Sets v to the corners, counted from the BVH's origin. Returns how far triangle 1 follows triangle 0 in the scene's
+/* Sets v to the corners, counted from the BVH's origin. ahead: how far triangle 1 follows triangle 0 in the scene's
  * list; 0: there is no triangle 1. */
-static uint32_t find_corners(const struct bvh *bvh, uint32_t first, uint32_t second, double v[4][3])
+static void find_corners(const struct bvh *bvh, uint32_t first, uint32_t ahead, double v[4][3])
 {
     const struct scene *scene = bvh->scene;
-    const uint32_t *a = scene->triangle[first], *b = second != BVH_NO_TRIANGLE ? scene->triangle[second] : a;
-    const int odd = second != BVH_NO_TRIANGLE ? odd_corner(a, b) : 0;
-    uint32_t corner[4] = {a[odd], a[(odd + 1) % 3], a[(odd + 2) % 3], a[odd]};
-    if (second != BVH_NO_TRIANGLE) corner[3] = b[odd_corner(b, a)];
+    const uint32_t *a = scene->triangle[first], *b = scene->triangle[first + ahead];
+    const int odd = ahead != 0 ? odd_corner(a, b) : 0;
+    const uint32_t corner[4] = {a[odd], a[(odd + 1) % 3], a[(odd + 2) % 3], ahead != 0 ? b[odd_corner(b, a)] : a[0]};
     for (int i = 0; i < 4; i++)
         vec3_sub(scene->vertex_m[corner[i]], bvh->origin_m, v[i]);
-    return second != BVH_NO_TRIANGLE ? second - first : 0;
 }
 
 /* Sets base_m to corner 0 in single precision. The lowest bits of its three numbers hold `rest` instead. */
@@ -66,10 +64,10 @@ static void set_base(struct bvh_leaf *leaf, const double corner0_m[3], uint32_t 
 }
 
 /* Setting the base's lowest bits moves it by up to 2^-17 of its distance. The size includes that. */
-static void fill_leaf(const struct bvh *bvh, uint32_t first, uint32_t second, struct bvh_leaf *leaf)
+static void fill_leaf(const struct bvh *bvh, uint32_t first, uint32_t ahead, struct bvh_leaf *leaf)
 {
     double v[4][3], size_m2 = 0.0;
-    const uint32_t ahead = find_corners(bvh, first, second, v);
+    find_corners(bvh, first, ahead, v);
     for (int i = 0; i < 4; i++)
         for (int j = 0; j < i; j++) {
             double d[3];
@@ -149,13 +147,13 @@ static int is_taken(const uint64_t *taken, uint32_t triangle)
     return (taken[triangle / 64] >> triangle % 64 & 1) != 0;
 }
 
-/* Returns the partner that makes the smallest box with the triangle, among the next ones of the list that a leaf can
- * name; or BVH_NO_TRIANGLE. */
+/* Finds the partner that makes the smallest box with the triangle, among the next ones of the list that a leaf can
+ * name. Returns how far it follows the triangle; 0: there is none. */
 static uint32_t partner(const struct scene *scene, uint32_t triangle, const uint64_t *taken)
 {
     const uint32_t left = scene->n_triangles - triangle,
                    end = triangle + (left < BVH_LEAF_AHEAD ? left : BVH_LEAF_AHEAD);
-    uint32_t best = BVH_NO_TRIANGLE;
+    uint32_t best = 0;
     double best_m2 = INFINITY, own_m2 = -1.0;
     for (uint32_t i = triangle + 1; i < end; i++) {
         if (is_taken(taken, i) || odd_corner(scene->triangle[triangle], scene->triangle[i]) == 3 ||
@@ -164,7 +162,7 @@ static uint32_t partner(const struct scene *scene, uint32_t triangle, const uint
         if (own_m2 < 0.0) own_m2 = box_m2(scene, triangle, triangle);
         const double both_m2 = box_m2(scene, triangle, i);
         if (both_m2 >= best_m2 || both_m2 > own_m2 + box_m2(scene, i, i)) continue;
-        best = i;
+        best = i - triangle;
         best_m2 = both_m2;
     }
     return best;
@@ -176,7 +174,7 @@ static uint32_t partner(const struct scene *scene, uint32_t triangle, const uint
  * that lie together. The order changes no hit. */
 struct place {
     uint64_t key;
-    uint32_t first, second; /* triangles */
+    uint32_t first, ahead; /* its first triangle, and how far its second one follows that */
 };
 enum { KEY_BITS = 16 };
 
@@ -220,9 +218,9 @@ static int find_places(struct bvh *bvh, uint64_t *taken, struct place *place, co
     for (uint32_t i = 0; i < scene->n_triangles; i++) {
         if ((i & 0xffff) == 0 && sh_check_stop(report, err) != SH_OK) return SH_ESTOPPED;
         if (is_taken(taken, i)) continue;
-        const uint32_t second = partner(scene, i, taken);
-        if (second != BVH_NO_TRIANGLE) taken[second / 64] |= UINT64_C(1) << second % 64;
-        place[bvh->n_leaves++] = (struct place){key_of(scene, i, per_m), i, second};
+        const uint32_t ahead = partner(scene, i, taken), second = i + ahead;
+        taken[second / 64] |= UINT64_C(1) << second % 64;
+        place[bvh->n_leaves++] = (struct place){key_of(scene, i, per_m), i, ahead};
     }
     return SH_OK;
 }
@@ -243,7 +241,7 @@ int bvh_make_leaves(struct bvh *bvh, const struct sh_report *report, struct sh_e
     if (rc == SH_ENOMEM) sh_fail(err, rc, "bvh: no memory for %zu triangles", n);
     for (uint32_t i = 0; i < bvh->n_leaves && rc == SH_OK; i++) {
         if ((i & 0xffff) == 0) rc = sh_check_stop(report, err);
-        fill_leaf(bvh, place[i].first, place[i].second, &bvh->leaf[i]);
+        fill_leaf(bvh, place[i].first, place[i].ahead, &bvh->leaf[i]);
     }
     free(place);
     free(taken);
@@ -265,9 +263,8 @@ void embree_asks_bounds(const struct RTCBoundsFunctionArguments *args)
 {
     const struct bvh *bvh = args->geometryUserPtr;
     const struct bvh_leaf *leaf = &bvh->leaf[args->primID];
-    const uint32_t ahead = bvh_leaf_ahead(bvh_leaf_rest(leaf));
     double lo[3], hi[3], v[4][3], far_m2 = 0.0;
-    find_corners(bvh, leaf->triangle, ahead != 0 ? leaf->triangle + ahead : (uint32_t)BVH_NO_TRIANGLE, v);
+    find_corners(bvh, leaf->triangle, bvh_leaf_ahead(bvh_leaf_rest(leaf)), v);
     vec3_bound_nothing(lo, hi);
     for (int i = 0; i < 4; i++) {
         vec3_bound(lo, hi, v[i]);

@@ -56,17 +56,6 @@ static double held_range(double v[3][3], const double dir[3], double range_m)
     return range_m < lo || isnan(range_m) ? lo : range_m > hi ? hi : range_m;
 }
 
-/* Notes a triangle that the ray misses by no more than the rounding of double at the triangle's edges. If there are
- * several, the nearest one counts; if some are equally near, the one with the lowest number does. */
-static void note_miss(struct bvh_query *query, uint32_t lane, uint32_t triangle, double range_m)
-{
-    if (!(range_m > query->at_origin_m) || range_m > query->near_m[lane]) return;
-    if (range_m == query->near_m[lane] && triangle > query->near[lane]) return;
-    if (is_hole(query, lane, triangle, range_m)) return;
-    query->near_m[lane] = range_m;
-    query->near[lane] = triangle;
-}
-
 void bvh_try_one(struct bvh_query *query, float *tfar, uint32_t lane, const struct bvh_leaf *leaf, int which)
 {
     const uint32_t triangle = bvh_leaf_triangle(leaf, which);
@@ -90,9 +79,10 @@ void bvh_try_one(struct bvh_query *query, float *tfar, uint32_t lane, const stru
     const double along = vec3_dot(plane->n, dir);
     double range_m = (plane->d - vec3_dot(plane->n, o)) / along;
     if (!(along * along > BVH_FLAT * BVH_FLAT * vec3_dot(plane->n, plane->n))) range_m = held_range(v, dir, range_m);
+    if (!(range_m > query->at_origin_m)) return;
     const double nearest_m = query->range_m[lane];
-    if (!hits)
-        note_miss(query, lane, triangle, range_m);
-    else if (range_m > query->at_origin_m && range_m <= nearest_m + BVH_SAME * nearest_m)
+    if (hits && range_m <= nearest_m + BVH_SAME * nearest_m)
         bvh_note_hit(query, tfar, lane, triangle, range_m);
+    else if (!hits && !is_hole(query, lane, triangle, range_m))
+        bvh_note_miss(query, lane, triangle, range_m);
 }

@@ -52,4 +52,14 @@ VEC_INLINE void bvh_take_hit(struct bvh_query *query, float *tfar, uint32_t lane
     add_tied(query, lane, triangle, range_m);
 }
 
+/* Notes a triangle that the ray misses by no more than the rounding of double at the triangle's edges. If there are
+ * several, the nearest one counts; if some are equally near, the one with the lowest number does. */
+static inline void bvh_note_miss(struct bvh_query *query, uint32_t lane, uint32_t triangle, double range_m)
+{
+    const double near_m = query->near_m[lane];
+    if (range_m > near_m || (range_m == near_m && triangle > query->near[lane])) return;
+    query->near_m[lane] = range_m;
+    query->near[lane] = triangle;
+}
+
 #endif

@@ -15,12 +15,13 @@ int ahead_create(uint32_t pulses, struct cast_ahead **out, struct sh_err *err)
 {
     struct cast_ahead *a = *out = aligned_alloc(64, (sizeof *a + 63) / 64 * 64);
     if (a == NULL) return sh_fail(err, SH_ENOMEM, "cast: no memory for lines ahead");
+    const size_t n = (size_t)pulses + CAST_AHEAD_RUNS * AHEAD_STEP;
     a->n_runs = 0;
     a->room = pulses;
-    a->range_m = malloc(pulses * sizeof *a->range_m);
-    a->triangle = malloc(pulses * sizeof *a->triangle);
-    a->label = malloc(pulses * sizeof *a->label);
-    a->steep = malloc(pulses * sizeof *a->steep);
+    a->range_m = malloc(n * sizeof *a->range_m);
+    a->triangle = malloc(n * sizeof *a->triangle);
+    a->label = malloc(n * sizeof *a->label);
+    a->steep = malloc(n * sizeof *a->steep);
     if (a->range_m != NULL && a->triangle != NULL && a->label != NULL && a->steep != NULL) return SH_OK;
     return sh_fail(err, SH_ENOMEM, "cast: no memory for %u pulses ahead", pulses);
 }
@@ -48,13 +49,14 @@ static uint32_t tile_of(const struct schedule_run *run, uint32_t n_runs)
 
 void ahead_begin(struct cast_ahead *a, const struct schedule_run *run, uint32_t n_runs)
 {
-    uint32_t at = 0;
+    uint32_t taken = 0;
     a->column = UINT64_MAX;
     a->end = 0;
-    for (a->n_runs = 0; a->n_runs < n_runs && run[a->n_runs].n <= a->room - at; a->n_runs++) {
+    for (a->n_runs = 0; a->n_runs < n_runs && run[a->n_runs].n <= a->room - taken; a->n_runs++) {
         const struct schedule_run *r = &run[a->n_runs];
+        const uint32_t at = taken + a->n_runs * AHEAD_STEP;
         a->run[a->n_runs] = (struct ahead_run){.pulse0 = r->pulse0, .column = r->in_line, .n = r->n, .at = at};
-        at += r->n;
+        taken += r->n;
         a->column = r->in_line < a->column ? r->in_line : a->column;
         a->end = (uint64_t)r->in_line + r->n > a->end ? (uint64_t)r->in_line + r->n : a->end;
     }
@@ -98,8 +100,8 @@ static void order_window(struct cast_ahead *a)
         }
 }
 
-/* Each copy has AHEAD_STEP elements, and may go beyond the end of the line's pulses. What it writes there is
- * overwritten by the next copies, or not read. */
+/* Each copy here and in keep_window has AHEAD_STEP elements, and may go beyond the end of the line's pulses. What it
+ * writes there is overwritten by the next copies, or not read. */
 static void gather_window(struct cast_ahead *a)
 {
     for (uint32_t j = 0; j < a->n_steps; j++) {
@@ -114,17 +116,11 @@ static void keep_window(struct cast_ahead *a)
 {
     for (uint32_t j = 0; j < a->n_steps; j++) {
         const struct ahead_step t = a->step[j];
-        memcpy(a->line[t.run].range_m + t.pulse, a->tile_range_m + t.at, AHEAD_STEP * sizeof(double));
-        memcpy(a->line[t.run].triangle + t.pulse, a->tile_triangle + t.at, AHEAD_STEP * sizeof(uint32_t));
-        memcpy(a->line[t.run].label + t.pulse, a->tile_label + t.at, AHEAD_STEP * sizeof(uint32_t));
-        memcpy(a->line[t.run].steep + t.pulse, a->tile_steep + t.at, AHEAD_STEP * sizeof(float));
-    }
-    for (uint32_t q = 0; q < a->n_runs; q++) {
-        const uint32_t at = a->run[q].at + a->run[q].first, n = a->run[q].in_window;
-        memcpy(a->range_m + at, a->line[q].range_m, n * sizeof(double));
-        memcpy(a->triangle + at, a->line[q].triangle, n * sizeof(uint32_t));
-        memcpy(a->label + at, a->line[q].label, n * sizeof(uint32_t));
-        memcpy(a->steep + at, a->line[q].steep, n * sizeof(float));
+        const uint32_t to = a->run[t.run].at + a->run[t.run].first + t.pulse;
+        memcpy(a->range_m + to, a->tile_range_m + t.at, AHEAD_STEP * sizeof(double));
+        memcpy(a->triangle + to, a->tile_triangle + t.at, AHEAD_STEP * sizeof(uint32_t));
+        memcpy(a->label + to, a->tile_label + t.at, AHEAD_STEP * sizeof(uint32_t));
+        memcpy(a->steep + to, a->tile_steep + t.at, AHEAD_STEP * sizeof(float));
     }
 }
 

@@ -26,16 +26,15 @@ struct cast_ahead {
     uint32_t n_runs, room; /* pulses that the arrays have room for */
     uint32_t tile;         /* consecutive pulses of a line that go into a packet */
     uint64_t column, end;  /* places in the lines: where the next window begins, and where the last line ends */
+    /* the hits, run by run; after each run there is room for AHEAD_STEP elements */
     double *range_m;
     uint32_t *triangle, *label;
     float *steep; /* only of beams with a footprint */
-    /* a window, line by line: directions of its pulses, and their hits */
+    /* a window, line by line: directions of its pulses */
     struct {
-        double x[AHEAD_ROOM], y[AHEAD_ROOM], z[AHEAD_ROOM], range_m[AHEAD_ROOM];
-        uint32_t triangle[AHEAD_ROOM], label[AHEAD_ROOM];
-        float steep[AHEAD_ROOM];
+        double x[AHEAD_ROOM], y[AHEAD_ROOM], z[AHEAD_ROOM];
     } line[CAST_AHEAD_RUNS];
-    /* the same in the order of tiles, in which they are cast */
+    /* the same in the order of tiles, in which they are cast, and the hits */
     struct chunk_vectors d;
     double tile_range_m[CHUNK_ROOM];
     uint32_t tile_triangle[CHUNK_ROOM], tile_label[CHUNK_ROOM];

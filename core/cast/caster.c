@@ -104,12 +104,9 @@ static void begin_echoes(struct echo_list *l, const struct chunk *k)
         l->width_m[i] = (float)k->s->pulse_m;
 }
 
-/* Returns the rays of the pulses' centres, and the places for their hits. */
-static struct ray_hits centres(struct caster *c, const struct chunk *k)
+struct ray_hits caster_centres(struct caster *c, const struct chunk *k, int bodies)
 {
     const struct cast_setup *s = k->s;
-    const int surfaces = s->detect != NULL && s->detect->surfaces != NULL && s->beam == NULL;
-    const int bodies = surfaces || (k->texels && caster_has_bodies(s)); /* texels need the body that was hit */
     return (struct ray_hits){.rays = {.n = k->n,
                                       .from = k->from,
                                       .dir = VEC3_IN(c->d, 0),
@@ -139,6 +136,8 @@ static uint32_t cast_chunk(struct caster *c, struct chunk *k)
 {
     const struct cast_setup *s = k->s;
     const int central = s->beam == NULL || s->beam->mode == BEAM_ADAPTIVE; /* rings have no ray for the centre */
+    const int surfaces = s->detect != NULL && s->detect->surfaces != NULL && s->beam == NULL;
+    const int bodies = surfaces || (k->texels && caster_has_bodies(s)); /* texels need the body that was hit */
     if (c->profile != NULL) c->profile->last = c->profile->now();
     caster_aim(c, k);
     begin_echoes(&c->list, k);
@@ -150,7 +149,7 @@ static uint32_t cast_chunk(struct caster *c, struct chunk *k)
         caster_report(c, k);
         return caster_points(c, k);
     }
-    struct ray_hits hits = centres(c, k);
+    struct ray_hits hits = caster_centres(c, k, bodies);
     hits.known = central && ahead_take(c->ahead, k, c->nearest.bvh, &hits.rays);
     if (central) caster_nearest(&c->nearest, s, &hits);
     if (s->tripod != NULL && s->beam == NULL) hide(c, k);

@@ -34,4 +34,7 @@ struct caster {
     uint32_t secondary_a[CAST_LIST], secondary_b[CAST_LIST], secondary_c[CAST_LIST]; /* echoes for the block */
 };
 
+/* Returns the rays of the pulses' centres, and the places for their hits. bodies: cosines and bodies are asked for. */
+struct ray_hits caster_centres(struct caster *c, const struct chunk *k, int bodies);
+
 #endif

@@ -82,16 +82,9 @@ static void take_paths(struct meeting *m, const struct ray_hits *hits, const str
 static void meet_chunk(struct caster *c, const struct chunk *k, struct meeting *m)
 {
     const struct cast_setup *s = k->s;
-    const struct ray_hits hits = {.rays = {.n = k->n,
-                                           .from = k->from,
-                                           .dir = VEC3_IN(c->d, 0),
-                                           .range_max_m = s->range_max_m,
-                                           .range_m = c->list.range_m,
-                                           .triangle = c->hit,
-                                           .label = c->list.label},
-                                  .cosine = c->list.cosine,
-                                  .body = c->body};
+    struct ray_hits hits = caster_centres(c, k, 1);
     const int follows = s->detect != NULL && s->detect->surfaces != NULL && s->detect->depth > 0;
+    hits.rays.steep = NULL; /* only footprints need it */
     caster_nearest(&c->nearest, s, &hits);
     if (s->tripod != NULL) c->counters.hidden += caster_hide(s->tripod, &VEC3_IN(c->d, 0), k->n, &c->list);
     if (follows) caster_follow(&c->nearest, s, &hits, &c->paths);

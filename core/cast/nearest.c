@@ -43,12 +43,11 @@ static void cast_body(struct nearest *w, const struct cast_setup *s, uint8_t bod
     const struct cast_mover *m = caster_body(s, body);
     const struct bvh_origins *from = &hits->rays.from;
     const int own = from->own.x != NULL;
-    const double at[3] = {own ? from->own.x[0] : from->at_m[0], own ? from->own.y[0] : from->at_m[1],
-                          own ? from->own.z[0] : from->at_m[2]};
     const double back_m[3] = {-m->shift_m[0], -m->shift_m[1], -m->shift_m[2]};
     const uint32_t n = hits->rays.n;
     struct bvh_rays rays = hits->rays;
-    double v[3], from_body[3];
+    double at[3], v[3], from_body[3];
+    bvh_origin_of(from, 0, at);
     mat3_apply(m->rotation, m->centre_m, v);
     vec3_add(v, m->shift_m, v);
     vec3_sub(v, at, v);

@@ -33,8 +33,8 @@ void caster_normal(const struct cast_setup *s, uint8_t body, uint32_t hit, doubl
  * double precision is less than a tenth of it, up to 1e8 m from the scene's zero. */
 static const double STEP_M = 1e-6;
 
-/* Makes ray k go on from its hit. */
-static void set_out(const struct cast_setup *s, struct path_rays *p, uint32_t k)
+/* Makes ray k go on from its hit, as ray `to` <= k. Only what set_out sets outlives the next cast. */
+static void set_out(const struct cast_setup *s, struct path_rays *p, uint32_t to, uint32_t k)
 {
     const struct surface *surface = surface_at(s->detect->surfaces, p->label[k]);
     double at[3] = VEC3_AT(p->p, k), dir[3] = VEC3_AT(p->d, k), n[3];
@@ -50,32 +50,17 @@ static void set_out(const struct cast_setup *s, struct path_rays *p, uint32_t k)
         share = surface->mirror;
         ghost = 1;
     }
-    p->length_m[k] += p->range_m[k] + step;
-    p->energy[k] *= share * share; /* back and forth */
-    p->ghost[k] = ghost;
+    p->ray[to] = p->ray[k];
+    p->length_m[to] = p->length_m[k] + (p->range_m[k] + step);
+    p->energy[to] = p->energy[k] * (share * share); /* back and forth */
+    p->ghost[to] = ghost;
     for (int a = 0; a < 3; a++)
         at[a] += step * dir[a];
-    VEC3_SET(p->p, k, at);
-    VEC3_SET(p->d, k, dir);
+    VEC3_SET(p->p, to, at);
+    VEC3_SET(p->d, to, dir);
 }
 
-static void copy_ray(struct path_rays *p, uint32_t to, uint32_t from)
-{
-    p->ray[to] = p->ray[from];
-    VEC3_SET(p->p, to, ((const double[3])VEC3_AT(p->p, from)));
-    VEC3_SET(p->d, to, ((const double[3])VEC3_AT(p->d, from)));
-    p->length_m[to] = p->length_m[from];
-    p->energy[to] = p->energy[from];
-    p->ghost[to] = p->ghost[from];
-    p->range_m[to] = p->range_m[from];
-    p->cosine[to] = p->cosine[from];
-    p->label[to] = p->label[from];
-    p->hit[to] = p->hit[from];
-    p->body[to] = p->body[from];
-    p->colour[to] = p->colour[from];
-}
-
-/* Begins the paths of rays whose first hit lets them go on. */
+/* Sends out the rays whose first hit lets them go on. */
 static void optics_begin(const struct cast_setup *s, const struct ray_hits *hits, struct path_rays *p)
 {
     const struct bvh_rays *rays = &hits->rays;
@@ -97,6 +82,7 @@ static void optics_begin(const struct cast_setup *s, const struct ray_hits *hits
         p->label[k] = rays->label[i];
         p->hit[k] = rays->triangle[i];
         p->body[k] = hits->body[i];
+        set_out(s, p, k, k);
     }
 }
 
@@ -125,8 +111,6 @@ void caster_follow(struct nearest *w, const struct cast_setup *s, const struct r
     optics_begin(s, first, p);
     for (uint32_t depth = 0; depth < s->detect->depth && p->n > 0; depth++) {
         uint32_t on = 0;
-        for (uint32_t k = 0; k < p->n; k++)
-            set_out(s, p, k);
         const struct ray_hits hits = {.rays = {.n = p->n,
                                                .from.own = VEC3_IN(p->p, 0),
                                                .dir = VEC3_IN(p->d, 0),
@@ -142,7 +126,7 @@ void caster_follow(struct nearest *w, const struct cast_setup *s, const struct r
         for (uint32_t k = 0; k < p->n; k++) {
             if (!(p->length_m[k] + p->range_m[k] <= s->range_max_m)) continue;
             optics_keep(p, k);
-            if (caster_goes_on(s, p->label[k])) copy_ray(p, on++, k);
+            if (caster_goes_on(s, p->label[k])) set_out(s, p, on++, k);
         }
         p->n = on;
     }

@@ -108,11 +108,10 @@ static int known_centre(const struct caster *c, const struct chunk *k, struct jo
     if (isnan(c->list.range_m[p])) return 1; /* nothing there */
     if (steep > 2500.0f) return 0;
     const struct bvh_plane *tri = bvh_plane(bvh, c->hit[p]);
-    double from_m[3], local[3];
+    double from_m[3];
     bvh_origin_of(&k->from, p, from_m);
     const struct sub_ray ray = sub_ray(&k->s->beam->beam, &job->sight, from_m, part->x, part->y);
-    bvh_origin(bvh, local);
-    vec3_sub(ray.from_m, local, from_m);
+    vec3_sub(ray.from_m, bvh_origin(bvh), from_m);
     r->range_m = (tri->d - vec3_dot(tri->n, from_m)) / vec3_dot(tri->n, ray.dir);
     r->energy = part->energy;
     r->sigma_m = k->spreads ? beam_part_sigma(&k->s->beam->beam, &job->sight, tri->n, r->range_m, part) : 0.0f;

@@ -299,7 +299,7 @@ int import_assimp(struct scene_build *b, struct sh_err *err)
     struct import_log log = {0};
     struct stat st;
     /* Assimp's C interface reports no progress, so a message at the start says that a large file takes a while. */
-    if (stat(b->spec->file, &st) == 0 && st.st_size > 8 << 20) build_announce(b);
+    if (stat(b->spec->file, &st) == 0 && st.st_size > 8 << 20) build_report(b, -1);
     int rc = check_skew(b, err);
     if (rc == SH_OK) rc = assimp_lib_load(&im.lib, err);
     if (rc != SH_OK) return rc;

@@ -296,7 +296,7 @@ static int read_library(struct mtl *m, const char *path, uint64_t line, struct s
 static int read_if_there(struct mtl *m, struct text_span name, uint64_t line, bool *found, struct sh_err *err)
 {
     const struct text_span folder = build_folder_of(m->b->spec->file);
-    char *path = build_find_file(&folder, 1, name);
+    char *path = build_find_file(&folder, 1, name, 1);
     *found = path != NULL;
     int rc = *found ? read_library(m, path, line, err) : SH_OK;
     free(path);
@@ -338,7 +338,7 @@ static int read_line(struct mtl *m, const struct mtl_line *line, bool *all, stru
     }
     for (const char *p = bare.p; p < end && any;) { /* some exist: each of the others gets a warning */
         const struct text_span folder = build_folder_of(m->b->spec->file), name = next_name(&p, end);
-        char *path = build_find_file(&folder, 1, name);
+        char *path = build_find_file(&folder, 1, name, 1);
         if (path == NULL) warn_of_library(m, name, line->line);
         *all &= path != NULL;
         free(path);

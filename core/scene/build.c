@@ -54,7 +54,7 @@ void build_begin_file(struct scene_build *b, const struct scene_mesh_spec *spec)
     b->file_ns = monotonic_ns();
 }
 
-static void build_report(struct scene_build *b, double fraction)
+void build_report(struct scene_build *b, double fraction)
 {
     char what[sizeof b->name + 16];
     snprintf(what, sizeof what, "reading %s", b->name);
@@ -372,11 +372,6 @@ int build_progress(void *build, double fraction, struct sh_err *err)
     int64_t now = monotonic_ns();
     if (now - b->start_ns >= 1000000000 && now - b->reported_ns >= 250000000) build_report(b, fraction);
     return sh_check_stop(b->report, err);
-}
-
-void build_announce(struct scene_build *b)
-{
-    build_report(b, -1);
 }
 
 struct text_span build_base_name(const struct scene_build *b)

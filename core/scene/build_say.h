@@ -17,7 +17,7 @@ void build_warn(const struct scene_build *b, const char *fmt, ...) __attribute__
  * Returns SH_ESTOPPED when the user has asked to stop. build: a struct scene_build. */
 int build_progress(void *build, double fraction, struct sh_err *err);
 
-/* Reports "reading FILE" with an unknown fraction, at once. */
-void build_announce(struct scene_build *b);
+/* Reports "reading FILE" at once. fraction: negative where it is unknown. */
+void build_report(struct scene_build *b, double fraction);
 
 #endif

@@ -142,7 +142,7 @@ static char *find_image(const struct scene_build *b, const struct build_image *i
 {
     const struct text_span folder[2] = {image->folder, build_folder_of(b->spec->file)};
     const size_t first = image->folder.p == NULL;
-    char *path = image->bytes == NULL ? build_find_file(folder + first, 2 - first, image->name) : NULL;
+    char *path = image->bytes == NULL ? build_find_file(folder + first, 2 - first, image->name, 1) : NULL;
     return path != NULL ? path : build_join(folder[1], image->name);
 }
 

@@ -104,52 +104,36 @@ static int add_surfaces(struct scene *scene, struct scene *mesh, const struct sc
 
 /* ---- places */
 
-/* A mesh, its outline, and the places that it is copied to. */
-struct copied {
-    const struct scene *mesh;
-    const struct scene_hull *hull;
-    const struct scene_places *places;
-};
-
-static int set_copy(const struct copied *of, size_t number, uint32_t label0, struct scene_copy *copy,
-                    struct sh_err *err)
+static int check_copy(const struct scene_places *places, size_t i, const struct scene_copy *copy, struct sh_err *err)
 {
-    const struct scene_place *place = &of->places->place[number];
-    const double turn = angle_rad(fmod(place->turn_deg, 360.0));
-    *copy = (struct scene_copy){.scale = place->scale, .cosine = cos(turn), .sine = sin(turn), .label0 = label0};
-    memcpy(copy->shift_m, place->at_m, sizeof copy->shift_m);
-    scene_set_copy_bounds(of->mesh, of->hull, copy);
     for (int k = 0; k < 3; k++)
         if (!(fabs(copy->min_m[k]) <= SCENE_MAX_COORDINATE_M && fabs(copy->max_m[k]) <= SCENE_MAX_COORDINATE_M))
             return sh_fail(
                 err, SH_EINPUT,
                 "%s: copy %zu goes from %g to %g m; allowed are coordinates up to %g m: check its place and its scale "
                 "of %g",
-                of->places->says, number + 1, copy->min_m[k], copy->max_m[k], SCENE_MAX_COORDINATE_M, copy->scale);
+                places->says, i + 1, copy->min_m[k], copy->max_m[k], SCENE_MAX_COORDINATE_M, copy->scale);
     return SH_OK;
 }
 
-static int set_copies(const struct scene *mesh, const struct scene_places *places, uint32_t label0,
+/* The copies' labels are those that add_surfaces will give next. */
+static int set_copies(struct scene *scene, const struct scene *mesh, const struct scene_places *places,
                       const struct sh_report *report, struct scene_copy *copy, struct sh_err *err)
 {
-    struct scene_hull hull;
-    const struct copied of = {mesh, &hull, places};
-    int rc = scene_find_hull(mesh, &hull, err);
-    for (size_t i = 0; i < places->n && rc == SH_OK; i++) {
-        if ((i & 0xff) == 0) rc = sh_check_stop(report, err);
-        const uint32_t own = places->own_surfaces ? (uint32_t)i * mesh->n_surfaces : 0;
-        if (rc == SH_OK) rc = set_copy(&of, i, label0 + own, &copy[i], err);
+    const uint32_t own = places->own_surfaces ? mesh->n_surfaces : 0;
+    for (size_t i = 0; i < places->n; i++) {
+        const struct scene_place *place = &places->place[i];
+        const double turn = angle_rad(fmod(place->turn_deg, 360.0));
+        copy[i] = (struct scene_copy){.scale = place->scale,
+                                      .cosine = cos(turn),
+                                      .sine = sin(turn),
+                                      .label0 = scene->n_surfaces + (uint32_t)i * own};
+        memcpy(copy[i].shift_m, place->at_m, sizeof copy[i].shift_m);
     }
-    scene_free_hull(&hull);
+    int rc = scene_bound_copies(scene, mesh, copy, places->n, report, err);
+    for (size_t i = 0; i < places->n && rc == SH_OK; i++)
+        rc = check_copy(places, i, &copy[i], err);
     return rc;
-}
-
-void scene_widen(struct scene *scene, const struct scene_copy *copy, size_t n)
-{
-    for (size_t i = 0; i < n; i++) {
-        vec3_bound(scene->min_m, scene->max_m, copy[i].min_m);
-        vec3_bound(scene->min_m, scene->max_m, copy[i].max_m);
-    }
 }
 
 static void keep_counts(struct scene *scene, const struct scene *mesh, const struct scene_copy *copy, size_t n)
@@ -178,7 +162,6 @@ static int keep_copies(struct scene *scene, struct scene *mesh, struct scene_cop
 int scene_add_copies(struct scene *scene, struct scene *mesh, const struct scene_places *places,
                      const struct sh_report *report, struct sh_err *err)
 {
-    const uint32_t label0 = scene->n_surfaces;
     if (places->n > (UINT32_MAX - 1 - scene->n_all) / mesh->n_triangles)
         return sh_fail(err, SH_EINPUT,
                        "%s: %zu copies of %u triangles are too many: a scene holds up to %u triangles with those of "
@@ -186,9 +169,8 @@ int scene_add_copies(struct scene *scene, struct scene *mesh, const struct scene
                        places->says, places->n, mesh->n_triangles, UINT32_MAX - 1, scene->n_all);
     struct scene_copy *copy = calloc(places->n + 1, sizeof *copy);
     int rc = copy != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory for %zu copies", places->n);
-    if (rc == SH_OK) rc = set_copies(mesh, places, label0, report, copy, err);
+    if (rc == SH_OK) rc = set_copies(scene, mesh, places, report, copy, err);
     if (rc == SH_OK) rc = add_surfaces(scene, mesh, places, err);
-    if (rc == SH_OK) scene_widen(scene, copy, places->n);
     if (rc == SH_OK) keep_counts(scene, mesh, copy, places->n);
     if (rc == SH_OK) rc = keep_copies(scene, mesh, copy, places->n, err);
     if (rc != SH_OK) free(copy);

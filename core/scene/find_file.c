@@ -91,7 +91,7 @@ static struct text_span last_part(struct text_span name)
     return (struct text_span){name.p + at, name.n - at};
 }
 
-static char *search(const struct text_span *folder, size_t n, struct text_span name, int any_case)
+char *build_find_file(const struct text_span *folder, size_t n, struct text_span name, int any_case)
 {
     char *path = NULL;
     for (int way = 0; way < (any_case ? 4 : 2) && path == NULL; way++)
@@ -100,15 +100,10 @@ static char *search(const struct text_span *folder, size_t n, struct text_span n
     return path;
 }
 
-char *build_find_file(const struct text_span *folder, size_t n, struct text_span name)
-{
-    return search(folder, n, name, 1);
-}
-
 char *scene_find_file(const char *const *folder, size_t n, const char *name, int any_case)
 {
     struct text_span in[4];
     for (size_t i = 0; i < n; i++)
         in[i] = (struct text_span){folder[i], strlen(folder[i])};
-    return search(in, n, (struct text_span){name, strlen(name)}, any_case);
+    return build_find_file(in, n, (struct text_span){name, strlen(name)}, any_case);
 }

@@ -28,12 +28,18 @@ static uint32_t add_chain(double (*hull)[2], uint32_t n, uint32_t least, const d
     return n + 1;
 }
 
-int scene_find_hull(const struct scene *scene, struct scene_hull *out, struct sh_err *err)
+/* The convex hull of a mesh's used vertices. */
+struct hull {
+    double (*point)[2];
+    uint32_t n;
+};
+
+static int find_hull(const struct scene *scene, struct hull *out, struct sh_err *err)
 {
     uint8_t *used = calloc((size_t)scene->n_vertices + 1, 1);
     double(*point)[2] = malloc(((size_t)scene->n_vertices + 1) * sizeof *point);
     uint32_t n = 0, k = 0;
-    *out = (struct scene_hull){.point = NULL};
+    *out = (struct hull){.point = NULL};
     for (uint32_t i = 0; used != NULL && i < scene->n_triangles; i++)
         for (int c = 0; c < 3; c++)
             used[scene->triangle[i][c]] = 1;
@@ -57,12 +63,7 @@ int scene_find_hull(const struct scene *scene, struct scene_hull *out, struct sh
     return SH_OK;
 }
 
-void scene_free_hull(struct scene_hull *hull)
-{
-    free(hull->point);
-}
-
-void scene_set_copy_bounds(const struct scene *mesh, const struct scene_hull *hull, struct scene_copy *copy)
+static void set_bounds(const struct scene *mesh, const struct hull *hull, struct scene_copy *copy)
 {
     vec3_bound_nothing(copy->min_m, copy->max_m);
     for (uint32_t i = 0; i < hull->n; i++)
@@ -72,4 +73,19 @@ void scene_set_copy_bounds(const struct scene *mesh, const struct scene_hull *hu
             scene_copy_put(copy, v, p);
             vec3_bound(copy->min_m, copy->max_m, p);
         }
+}
+
+int scene_bound_copies(struct scene *scene, const struct scene *mesh, struct scene_copy *copy, size_t n,
+                       const struct sh_report *report, struct sh_err *err)
+{
+    struct hull hull;
+    int rc = find_hull(mesh, &hull, err);
+    for (size_t i = 0; i < n && rc == SH_OK; i++) {
+        if ((i & 0xff) == 0) rc = sh_check_stop(report, err);
+        set_bounds(mesh, &hull, &copy[i]);
+        vec3_bound(scene->min_m, scene->max_m, copy[i].min_m);
+        vec3_bound(scene->min_m, scene->max_m, copy[i].max_m);
+    }
+    free(hull.point);
+    return rc;
 }

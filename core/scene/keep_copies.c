@@ -6,11 +6,6 @@
 #include "core/scene/copies.h"
 #include "core/scene/hull.h"
 
-static int keeps_any(const uint8_t *keep, uint32_t n)
-{
-    return memchr(keep, 1, n) != NULL;
-}
-
 /* Keeps the copies that keep some surface, with new labels. kept: the surfaces of the mesh that they
  * keep. */
 static int keep_some(struct scene_copied *of, const uint8_t *keep, const uint16_t *label, const uint8_t **kept,
@@ -20,8 +15,8 @@ static int keep_some(struct scene_copied *of, const uint8_t *keep, const uint16_
     uint32_t n = 0;
     *kept = NULL;
     for (uint32_t k = 0; k < of->n; k++) {
-        const uint8_t *here = keep + of->copy[k].label0;
-        if (!keeps_any(here, surfaces)) continue;
+        const uint8_t *here = keep + of->copy[k].label0, *first = memchr(here, 1, surfaces);
+        if (first == NULL) continue;
         if (*kept == NULL) *kept = here;
         if (memcmp(*kept, here, surfaces) != 0)
             return sh_fail(
@@ -30,22 +25,10 @@ static int keep_some(struct scene_copied *of, const uint8_t *keep, const uint16_
                 "patterns that fit the same objects of each copy",
                 k + 1);
         of->copy[n] = of->copy[k];
-        of->copy[n++].label0 =
-            label[of->copy[k].label0 + (uint32_t)((const uint8_t *)memchr(here, 1, surfaces) - here)];
+        of->copy[n++].label0 = label[first - keep];
     }
     of->n = n;
     return SH_OK;
-}
-
-static int bound(struct scene *scene, struct scene_copied *of, struct sh_err *err)
-{
-    struct scene_hull hull;
-    const int rc = scene_find_hull(of->mesh, &hull, err);
-    for (uint32_t k = 0; k < of->n && rc == SH_OK; k++)
-        scene_set_copy_bounds(of->mesh, &hull, &of->copy[k]);
-    if (rc == SH_OK) scene_widen(scene, of->copy, of->n);
-    scene_free_hull(&hull);
-    return rc;
 }
 
 int scene_keep_copies(struct scene *scene, const uint8_t *keep, const uint16_t *label, struct sh_err *err)
@@ -65,7 +48,7 @@ int scene_keep_copies(struct scene *scene, const uint8_t *keep, const uint16_t *
         }
         rc = keep_some(of, keep, label, &kept, err);
         if (rc == SH_OK && kept != NULL) rc = scene_keep(of->mesh, kept, err);
-        if (rc == SH_OK && kept != NULL) rc = bound(scene, of, err);
+        if (rc == SH_OK && kept != NULL) rc = scene_bound_copies(scene, of->mesh, of->copy, of->n, NULL, err);
         if (rc != SH_OK || kept == NULL || of->mesh->n_all == 0) continue;
         of->first = scene->n_all;
         scene->n_all += of->n * of->mesh->n_triangles;

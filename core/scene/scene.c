@@ -6,6 +6,7 @@
 
 #include "core/grow.h"
 #include "core/scene/build_load.h"
+#include "core/scene/cutouts.h"
 
 const struct scene_import_limits scene_import_defaults = {.memory_mib = 8192, .time_s = 300, .files = 64};
 
@@ -80,17 +81,13 @@ void scene_free(struct scene *scene)
         free(scene->copied[i].copy);
     }
     free(scene->copied);
+    scene_drop_textures(scene);
     free(scene->vertex_m);
     free(scene->triangle);
     free(scene->label);
     free(scene->surface);
     free(scene->uv);
     free(scene->rgb);
-    for (uint32_t i = 0; i < scene->n_textures; i++) {
-        free(scene->texture[i].file);
-        free(scene->texture[i].bytes);
-    }
-    free(scene->texture);
     for (uint32_t i = 0; i < scene->n_masks; i++)
         free(scene->mask[i]);
     free(scene->mask);

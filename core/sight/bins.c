@@ -109,13 +109,7 @@ static void find_seen(struct build_shared *b)
             }
 }
 
-static void bins_count(struct build_shared *b, uint32_t region, uint32_t number)
-{
-    b->bin[region + 1]++;
-    if ((number & BUILD_IS_GROUP) == 0) b->kept[number]++;
-}
-
-/* Counts a triangle or a group in each region of the range. Once all are counted, `write` puts its number into the bins
+/* Counts a triangle or a group in each region of the range, and a triangle's regions. Once all are counted, `write` puts its number into the bins
  * of these regions. */
 static void put_range(struct build_shared *b, uint32_t face, const struct range *r, uint32_t number, int write)
 {
@@ -123,10 +117,12 @@ static void put_range(struct build_shared *b, uint32_t face, const struct range 
         for (uint32_t i = r->u0; i <= r->u1; i++) {
             const uint32_t at = region_number(b, face, i, j);
             if (!b->seen[at]) continue;
-            if (write)
+            if (write) {
                 b->binned[b->bin[at]++] = number;
-            else
-                bins_count(b, at, number);
+                continue;
+            }
+            b->bin[at + 1]++;
+            if ((number & BUILD_IS_GROUP) == 0) b->kept[number]++;
         }
 }
 

@@ -51,9 +51,8 @@ static void set_edge(const double a[3], const double b[3], double sign, double s
 static int set_plane(const struct sight *sight, struct build_candidate *c)
 {
     const struct bvh_plane *p = bvh_plane(sight->bvh, c->triangle);
-    double origin_m[3], o_local[3], m[3];
-    bvh_origin(sight->bvh, origin_m);
-    vec3_sub(sight->station_m, origin_m, o_local);
+    double o_local[3], m[3];
+    vec3_sub(sight->station_m, bvh_origin(sight->bvh), o_local);
     const double length = vec3_length(p->n), off = p->d - vec3_dot(p->n, o_local);
     if (!(length > 0.0)) return 0;
     const double height_m = fabs(off) / length;

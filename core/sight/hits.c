@@ -11,7 +11,6 @@ struct sight_work {
     struct sight_run run[HITS_ROOM];
     uint32_t triangle[HITS_ROOM]; /* of a run's rays */
     /* Rays that go to the BVH. */
-    uint8_t asks[HITS_ROOM]; /* 1: this ray of the chunk goes there */
     uint32_t ray[HITS_ROOM]; /* their numbers in the chunk */
     double x[HITS_ROOM], y[HITS_ROOM], z[HITS_ROOM], range_m[HITS_ROOM];
     uint32_t hit[HITS_ROOM], label[HITS_ROOM];
@@ -38,8 +37,8 @@ const struct sight_counters *sight_work_counters(const struct sight_work *work)
 
 static void ask(struct sight_work *w, uint32_t from, uint32_t to, uint32_t *asked)
 {
-    memset(w->asks + from, 1, to - from);
-    *asked += to - from;
+    for (uint32_t i = from; i < to; i++)
+        w->ray[(*asked)++] = i;
 }
 
 /* Decides rays that have a list. Rays that the records can't decide go to the BVH. */
@@ -97,22 +96,10 @@ static uint32_t do_runs(struct sight_work *w, const struct sight *s, const struc
     return asked;
 }
 
-static uint32_t gather(struct sight_work *w, const struct bvh_rays *rays)
+static void ask_bvh(struct sight_work *w, struct bvh_work *bvh_work, const struct sight *s, const struct bvh_rays *rays,
+                    uint32_t n)
 {
-    uint32_t m = 0;
-    for (uint32_t i = 0; i < rays->n; i++)
-        if (w->asks[i]) w->ray[m++] = i;
-    for (uint32_t k = 0; k < m; k++) {
-        w->x[k] = rays->dir.x[w->ray[k]];
-        w->y[k] = rays->dir.y[w->ray[k]];
-        w->z[k] = rays->dir.z[w->ray[k]];
-    }
-    return m;
-}
-
-static void ask_bvh(struct sight_work *w, struct bvh_work *bvh_work, const struct sight *s, const struct bvh_rays *rays)
-{
-    struct bvh_rays asked = {.n = gather(w, rays),
+    struct bvh_rays asked = {.n = n,
                              .from = rays->from,
                              .dir = VEC3_IN(*w, 0),
                              .range_max_m = rays->range_max_m,
@@ -120,15 +107,19 @@ static void ask_bvh(struct sight_work *w, struct bvh_work *bvh_work, const struc
                              .triangle = w->hit,
                              .label = w->label,
                              .steep = rays->steep != NULL ? w->steep : NULL};
+    for (uint32_t k = 0; k < n; k++) {
+        w->x[k] = rays->dir.x[w->ray[k]];
+        w->y[k] = rays->dir.y[w->ray[k]];
+        w->z[k] = rays->dir.z[w->ray[k]];
+    }
     bvh_hits(bvh_work, s->bvh, &asked);
-    for (uint32_t k = 0; k < asked.n; k++) {
+    for (uint32_t k = 0; k < n; k++) {
         const uint32_t i = w->ray[k];
         rays->range_m[i] = w->range_m[k];
         rays->triangle[i] = w->hit[k];
         if (rays->label != NULL) rays->label[i] = w->label[k];
         if (rays->steep != NULL) rays->steep[i] = w->steep[k];
     }
-    memset(w->asks, 0, rays->n);
 }
 
 static void look_up_chunk(struct sight_work *w, struct bvh_work *bvh_work, const struct sight *s,
@@ -140,7 +131,7 @@ static void look_up_chunk(struct sight_work *w, struct bvh_work *bvh_work, const
     const uint32_t asked = do_runs(w, s, rays, runs);
     bvh_stage_ends(profile, BVH_STAGE_REFINE);
     w->counters.asked += asked;
-    if (asked != 0) ask_bvh(w, bvh_work, s, rays);
+    if (asked != 0) ask_bvh(w, bvh_work, s, rays, asked);
     if (rays->steep != NULL) bvh_work_set_directions(bvh_work, &rays->dir, rays->n);
 }
 

@@ -191,18 +191,15 @@ static void region_look(const struct build_work *w, const struct seen *in, struc
  * of whole tiles. */
 static void put_leaf(const struct division *d, const struct square *q, uint32_t leaf)
 {
-    struct sight *s = d->b->sight;
-    if (q->size < SIGHT_TILE) {
-        uint32_t *to = &d->block[(q->v - d->block_v) * SIGHT_TILE + q->u - d->block_u];
-        for (uint32_t v = 0; v < q->size; v++)
-            for (uint32_t u = 0; u < q->size; u++)
-                to[v * SIGHT_TILE + u] = leaf;
-        return;
-    }
-    const uint32_t tiles = s->cells / SIGHT_TILE;
-    for (uint32_t v = q->v / SIGHT_TILE; v < (q->v + q->size) / SIGHT_TILE; v++)
-        for (uint32_t u = q->u / SIGHT_TILE; u < (q->u + q->size) / SIGHT_TILE; u++)
-            s->tile[(d->face * tiles + v) * tiles + u] = leaf;
+    const struct sight *s = d->b->sight;
+    const int in_block = q->size < SIGHT_TILE;
+    const uint32_t tiles = s->cells / SIGHT_TILE, row = in_block ? (uint32_t)SIGHT_TILE : tiles,
+                   n = in_block ? q->size : q->size / SIGHT_TILE;
+    uint32_t *to = in_block ? &d->block[(q->v - d->block_v) * SIGHT_TILE + q->u - d->block_u]
+                            : &s->tile[(d->face * tiles + q->v / SIGHT_TILE) * tiles + q->u / SIGHT_TILE];
+    for (uint32_t v = 0; v < n; v++)
+        for (uint32_t u = 0; u < n; u++)
+            to[v * row + u] = leaf;
 }
 
 static uint32_t record_of(const struct division *d, struct build_candidate *c)

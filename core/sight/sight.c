@@ -218,7 +218,7 @@ void sight_free(struct sight *sight)
     free(sight);
 }
 
-void sight_get_info(const struct sight *sight, struct sight_info *info)
+const struct sight_info *sight_get_info(const struct sight *sight)
 {
-    *info = sight->info;
+    return &sight->info;
 }

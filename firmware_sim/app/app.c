@@ -236,9 +236,9 @@ static int asked_to_stop(void *ctx)
     return app_interrupted();
 }
 
-const struct sh_report app_report_stderr = {NULL, print_warning, print_progress, asked_to_stop};
-const struct sh_report app_report_seconds = {NULL, print_warning, print_each_second, asked_to_stop};
-const struct sh_report app_report_quiet = {NULL, print_warning, NULL, asked_to_stop};
+const struct sh_report app_report_stderr = {NULL, print_warning, print_progress, asked_to_stop, NULL};
+const struct sh_report app_report_seconds = {NULL, print_warning, print_each_second, asked_to_stop, NULL};
+const struct sh_report app_report_quiet = {NULL, print_warning, NULL, asked_to_stop, NULL};
 
 void app_warn_left_out(uint64_t crowded, uint64_t unfit, uint64_t lost_samples)
 {

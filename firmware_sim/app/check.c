@@ -91,11 +91,10 @@ static void print_platform(const struct site *site, FILE *out)
 
 static double bytes_of(const struct scene *scene, const struct bvh *bvh)
 {
-    struct bvh_info info;
-    bvh_get_info(bvh, &info);
     const double triangle =
         sizeof *scene->triangle + sizeof *scene->label + (scene->uv != NULL ? sizeof *scene->uv : 0);
-    double bytes = (double)info.bytes + scene->n_copies * (double)sizeof(struct scene_copy); /* with the meshes' BVHs */
+    double bytes = (double)bvh_get_info(bvh)->bytes; /* with the meshes' BVHs */
+    bytes += scene->n_copies * (double)sizeof(struct scene_copy);
     for (uint32_t i = 0; i <= scene->n_copied; i++) {
         const struct scene *mesh = i == 0 ? scene : scene->copied[i - 1].mesh;
         bytes += mesh->n_triangles * triangle + mesh->n_vertices * (double)sizeof *mesh->vertex_m;
@@ -227,13 +226,13 @@ static void check_warn(void *ctx, const char *text)
 {
     struct check_run *run = ctx;
     run->n_warnings++;
-    app_report_stderr.warn(app_report_stderr.ctx, text);
+    sh_warn(&app_report_stderr, "%s", text);
 }
 
 static int check(struct config *cfg, void *ctx, struct sh_err *err)
 {
     struct check_run *run = ctx;
-    const struct sh_report report = {run, check_warn, app_report_stderr.progress, app_report_stderr.stop};
+    const struct sh_report report = {.ctx = run, .warn = check_warn, .rest = &app_report_stderr};
     struct sites sites = {0};
     FILE *out = run->csv != NULL && strcmp(run->csv, "-") == 0 ? stderr : stdout; /* CSV alone is on standard output */
     int rc = sites_load(cfg, SITE_FOR_SCANS, &report, &sites, err);

@@ -14,29 +14,17 @@ static void scanner_report_warn(void *ctx, const char *text)
         i++;
     if (i < w->n && w->are_printed) return;
     if (i == w->n && (w->are_printed || w->n == SITE_MAX_WARNINGS || (w->one[i].text = strdup(text)) == NULL)) {
-        sh_warn(r->to, "scanner of station %u: %s", r->station, text);
+        sh_warn(r->report.rest, "scanner of station %u: %s", r->station, text);
         return;
     }
     w->n += i == w->n;
     w->one[i].is_of[r->station - 1] = 1;
 }
 
-static void progress(void *ctx, const char *what, double fraction)
-{
-    const struct scanner_report *r = ctx;
-    sh_progress(r->to, what, fraction);
-}
-
-static int stop(void *ctx)
-{
-    const struct scanner_report *r = ctx;
-    return sh_stopped(r->to);
-}
-
 void scanner_report_set_up(struct scanner_report *report, const struct sh_report *to, uint32_t station,
                            struct scanner_warnings *warnings)
 {
-    *report = (struct scanner_report){{report, scanner_report_warn, progress, stop}, to, warnings, station};
+    *report = (struct scanner_report){{.ctx = report, .warn = scanner_report_warn, .rest = to}, warnings, station};
     warnings->n_scanners += !warnings->are_printed;
 }
 

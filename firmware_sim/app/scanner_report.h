@@ -20,7 +20,6 @@ struct scanner_warnings {
 /* A report that notes warnings, and hands on all else. The struct must not move. */
 struct scanner_report {
     struct sh_report report;
-    const struct sh_report *to;
     struct scanner_warnings *warnings;
     uint32_t station; /* from 1: the first that has the scanner */
 };

@@ -16,15 +16,13 @@ void device_fill_descriptor(const struct device_scan *scan, const char *idn, uin
     const struct config *cfg = site->cfg;
     const struct schedule_spec *spec = &scan->segment.spec;
     struct cast_setup setup;
-    struct bvh_info info;
     site_cast_setup(site, scan->station, &setup);
     site_set_program(site, scan->prr_uhz, &setup);
-    bvh_get_info(setup.bvh, &info);
     memset(d, 0, sizeof *d);
     memcpy(d->idn, idn, sizeof d->idn);
     memcpy(d->profile, cfg->profile.name, sizeof d->profile);
     d->layout = cfg->output.layout == LINE_GEO ? NATIVE_GEO : NATIVE_POLAR;
-    d->isa = info.packet;
+    d->isa = bvh_get_info(setup.bvh)->packet;
     d->prr_uhz = (uint64_t)scan->prr_uhz;
     d->lines_uhz = (uint64_t)scan->lines_uhz;
     d->pan_udeg_s = (uint64_t)spec->pan_udeg_s;

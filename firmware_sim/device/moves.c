@@ -68,7 +68,7 @@ static struct device_version *make_moved(struct device *device, const struct sit
                                          struct sh_err *err)
 {
     struct device_moves *moves = &device->moves;
-    const struct sh_report report = {device, moves_warn, NULL, move_stops};
+    const struct sh_report report = {device, moves_warn, NULL, move_stops, NULL};
     const struct site_station_move move = {moves->first, plan->station, plan->to_first ? NULL : &plan->to};
     struct site *site;
     int rc = site_load_moved(from, &move, &report, &site, err);

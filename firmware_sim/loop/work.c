@@ -280,7 +280,7 @@ static uint64_t move_meshes(struct worker *worker, const struct device_work *wor
     if (site->n_movers == 0) return end;
     const int64_t tick_ns = 1000000000 / llround(site->cfg->loop.tick_hz);
     const int64_t from_ns = schedule_time_ns(&work->segment, k) / tick_ns * tick_ns;
-    site_move(site, site_mover_time(site, work->station, 1e-9 * (double)from_ns), &worker->setup);
+    site_move(site, work->station, 1e-9 * (double)from_ns, &worker->setup);
     if (site->stop != NULL) return end;
     const uint64_t next = schedule_pulse_at(&work->segment, from_ns + tick_ns);
     return next < end ? next : end;

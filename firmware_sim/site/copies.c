@@ -62,14 +62,13 @@ static int read_file(const char *path, const struct sh_report *report, struct sc
 static int take_list(const struct config *cfg, uint32_t number, struct scene_place **place, size_t *n,
                      struct sh_err *err)
 {
-    for (uint32_t i = 0; i < cfg->scene.n_copies; i++)
-        *n += cfg->scene.copy[i].mesh == number;
-    if (*n == 0) return SH_OK;
-    *place = malloc(*n * sizeof **place);
-    if (*place == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %zu copies", *n);
-    *n = 0;
-    for (uint32_t i = 0; i < cfg->scene.n_copies; i++)
-        if (cfg->scene.copy[i].mesh == number) (*place)[(*n)++] = cfg->scene.copy[i].place;
+    size_t room = 0;
+    for (uint32_t i = 0; i < cfg->scene.n_copies; i++) {
+        if (cfg->scene.copy[i].mesh != number) continue;
+        if (!grow(place, &room, *n + 1, sizeof **place))
+            return sh_fail(err, SH_ENOMEM, "no memory for %zu copies", *n + 1);
+        (*place)[(*n)++] = cfg->scene.copy[i].place;
+    }
     return SH_OK;
 }
 

@@ -179,17 +179,14 @@ static void set_up_noise(const struct config *cfg, struct site_detect *d)
     d->cast.ball = &d->ball;
 }
 
-static struct detect_signal *signal_in_use(const struct config *cfg, struct site_detect *d)
-{
-    return cfg->signal.on ? &d->signal[config_program_of(&cfg->profile, cfg->head.settings.prr_uhz)] : NULL;
-}
-
 int site_vary_detect(struct site *site, struct sh_err *err)
 {
+    const struct config *cfg = site->cfg;
     struct site_detect *d = &site->detect;
-    int rc = site->cfg->signal.on ? set_up_signals(site, err) : SH_OK;
-    d->cast.signal = signal_in_use(site->cfg, d);
-    set_up_noise(site->cfg, d);
+    const uint32_t in_use = config_program_of(&cfg->profile, cfg->head.settings.prr_uhz);
+    int rc = cfg->signal.on ? set_up_signals(site, err) : SH_OK;
+    d->cast.signal = cfg->signal.on ? &d->signal[in_use] : NULL;
+    set_up_noise(cfg, d);
     site_set_depth(site, d->cast.depth);
     return rc;
 }

@@ -118,50 +118,42 @@ static int scale_station(const struct site *site, struct site_station *s, double
     return rc;
 }
 
-/* Sets the scale of all stations; fails where one does not fit. Polar points have no coordinates, so all fit. */
+static const double FINEST_M = 1e-6, MOST_RANGE_COUNTS = 4294967295.0;
+
+/* Sets the scale of all stations; fails where one does not fit. In the polar layout ranges must fit into 32 bits, since
+ * a longer one would be read as a short one; polar points have no coordinates, so all of these fit. In the geo layout
+ * coordinates from anywhere on a stretch must fit into 31 bits. */
 static int scale_stations(struct site *site, double scale_m, struct sh_err *err)
 {
+    const struct config *cfg = site->cfg;
+    const int polar = cfg->output.layout == LINE_POLAR;
+    const double most_m = longest_m(site) + site_ball_m(site), least_m = most_m / MOST_RANGE_COUNTS;
     int rc = SH_OK;
     struct sh_err why;
     site->scale_m = scale_m;
+    if (polar && scale_m < least_m)
+        return sh_fail(
+            err, SH_EINPUT,
+            "%s: output.scale_m: %g: ranges up to %.6g m do not fit into 32 bits; allowed 0 (automatic) and from "
+            "%.3g m on",
+            cfg->file, scale_m, most_m, digits_up(least_m, 3));
     for (uint32_t i = 0; i < site->n_stations && rc == SH_OK; i++) {
         struct site_station *s = &site->station[i];
         rc = scale_station(site, s, scale_m, &why);
-        if (site->cfg->output.layout == LINE_POLAR) rc = SH_OK;
+        if (polar) rc = SH_OK;
         if (rc != SH_OK)
-            sh_fail(err, rc, "%s: output.scale_m: station %s: %.300s", site->cfg->file, s->station->name, why.text);
+            sh_fail(err, rc, "%s: output.scale_m: station %s: %.300s", cfg->file, s->station->name, why.text);
     }
     return rc;
 }
 
-static const double FINEST_M = 1e-6, MOST_RANGE_COUNTS = 4294967295.0;
-
-/* For the polar layout. A range that needs more than 32 bits would be read as a short one. */
-static int choose_range_scale(struct site *site, double *scale_m, struct sh_err *err)
-{
-    const struct config *cfg = site->cfg;
-    const double most_m = longest_m(site) + site_ball_m(site), least_m = most_m / MOST_RANGE_COUNTS;
-    for (*scale_m = FINEST_M; *scale_m < least_m;)
-        *scale_m *= 10.0;
-    if (cfg->output.scale_m > 0.0) *scale_m = cfg->output.scale_m;
-    if (*scale_m >= least_m) return SH_OK;
-    return sh_fail(
-        err, SH_EINPUT,
-        "%s: output.scale_m: %g: ranges up to %.6g m do not fit into 32 bits; allowed 0 (automatic) and from "
-        "%.3g m on",
-        cfg->file, *scale_m, most_m, digits_up(least_m, 3));
-}
-
-/* Chooses the finest 1e-6 x 10^n m with which everything fits, unless the configuration names a scale. In the polar
- * layout ranges must fit into 32 bits, in the geo layout coordinates from anywhere on a stretch into 31. */
+/* Chooses the finest 1e-6 x 10^n m with which everything fits, unless the configuration names a scale. */
 static int choose_scale(struct site *site, struct sh_err *err)
 {
-    const struct config *cfg = site->cfg;
-    double scale_m = cfg->output.scale_m > 0.0 ? cfg->output.scale_m : FINEST_M;
-    int rc = SH_OK;
-    if (cfg->output.layout == LINE_POLAR) rc = choose_range_scale(site, &scale_m, err);
-    if (rc == SH_OK) rc = scale_stations(site, scale_m, err);
-    while (rc != SH_OK && cfg->output.scale_m <= 0.0 && scale_m < 1.0)
+    const double given_m = site->cfg->output.scale_m;
+    double scale_m = given_m > 0.0 ? given_m : FINEST_M;
+    int rc = scale_stations(site, scale_m, err);
+    while (rc != SH_OK && given_m <= 0.0 && scale_m < 1.0)
         rc = scale_stations(site, scale_m *= 10.0, err);
     return rc;
 }

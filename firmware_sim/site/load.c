@@ -214,7 +214,7 @@ int site_load(const struct config *cfg, const struct sh_report *report, struct s
 void site_free(struct site *site)
 {
     if (site == NULL) return;
-    site_close_sights(site);
+    site_retire(site);
     free(site->direction);
     free(site->knot);
     free(site->stop);

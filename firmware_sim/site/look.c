@@ -6,7 +6,7 @@ static void enter(void *ctx, int64_t t_ns, struct cast_setup *setup)
 {
     const struct site_look_at *at = ctx;
     const struct site *site = at->site;
-    site_move(site, site_mover_time(site, at->station, 1e-9 * (double)t_ns), setup);
+    site_move(site, at->station, 1e-9 * (double)t_ns, setup);
     if (site->n_knots == 0) return;
     site_enter(site, at->station, site_stretch_at(site, t_ns), setup);
     setup->knot = site->knot;

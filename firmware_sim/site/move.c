@@ -116,8 +116,3 @@ int site_load_moved(const struct site *from, const struct site_station_move *mov
     *out = NULL;
     return rc;
 }
-
-void site_retire(const struct site *site)
-{
-    site_close_sights((struct site *)(uintptr_t)site);
-}

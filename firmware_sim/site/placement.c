@@ -177,13 +177,9 @@ static int stand_on_floor(const struct config_station *s, const double level[9],
 {
     const double up[3] = {level[2], level[5], level[8]}, down[3] = {-up[0], -up[1], -up[2]};
     double from_m[3];
-    struct bvh_work *work;
-    int rc = bvh_work_create(&work, err);
-    if (rc != SH_OK) return rc;
     for (int i = 0; i < 3; i++)
         from_m[i] = out->position_m[i] + FLOOR_ABOVE_M * up[i];
-    const double range_m = bvh_ray(work, bvh, from_m, down);
-    bvh_work_free(work);
+    const double range_m = bvh_ray(bvh, from_m, down);
     if (isnan(range_m))
         return sh_fail(err, SH_EINPUT,
                        "instrument_height_m, but no surface of the scene lies below %.10g %.10g %.10g m; give a place "

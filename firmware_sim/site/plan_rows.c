@@ -136,9 +136,7 @@ int site_plan_rows(struct site *site, struct sh_err *err)
     struct site_plan *plan = &site->plan;
     struct plan_row of_head[PLAN_HEAD_ROWS];
     struct plan_head head;
-    struct bvh_info bvh;
     ask_head(site, &head);
-    bvh_get_info(site->bvh, &bvh);
     size_t n = plan_head(&head, of_head);
     free(plan->row);
     plan->row = calloc(n + 13 + site->n_stations, sizeof *plan->row);
@@ -149,7 +147,7 @@ int site_plan_rows(struct site *site, struct sh_err *err)
     add_range(site, plan);
     add_tripods(site, plan);
     plan_mesh(site_mesh_error_m(site), &plan->row[plan->n++]);
-    plan_cast(bvh.packet, &plan->row[plan->n++]);
+    plan_cast(bvh_get_info(site->bvh)->packet, &plan->row[plan->n++]);
     plan->row[plan->n++] = plan->sight;
     for (size_t i = 0; i < n; i++) {
         plan->row[plan->n++] = of_head[i];
@@ -175,16 +173,15 @@ double site_planned_ns(const struct site *site)
 {
     struct plan_row of_head[PLAN_HEAD_ROWS];
     struct plan_head head;
-    struct bvh_info bvh;
     const struct plan_methods *methods = &site->plan.methods;
+    const uint32_t packet = bvh_get_info(site->bvh)->packet;
     ask_head(site, &head);
-    bvh_get_info(site->bvh, &bvh);
     const size_t n = plan_head(&head, of_head);
-    double sum_ns = plan_pulse_ns(site->scene->n_triangles, bvh.packet) + cost_ns(&site->plan.sight, 0.0) +
+    double sum_ns = plan_pulse_ns(site->scene->n_triangles, packet) + cost_ns(&site->plan.sight, 0.0) +
                     cost_ns(&site->plan.beam, PLAN_COST_OUTLINES + PLAN_COST_CUT) +
                     cost_ns(&site->plan.optics, methods->depth * PLAN_COST_SUB_RAY) + site_wave_ns(site);
     for (uint32_t i = 0; i < site->n_movers; i++)
-        sum_ns += plan_pulse_ns(site->mover[i].scene->n_triangles, bvh.packet);
+        sum_ns += plan_pulse_ns(site->mover[i].scene->n_triangles, packet);
     for (size_t i = 0; i < n; i++)
         sum_ns += cost_ns(&of_head[i], 0.0);
     if (site->cfg->output.layout != LINE_POLAR && site->n_stations > 0) sum_ns += cost_ns(&site->station[0].plan, 0.0);

@@ -166,8 +166,7 @@ static void cast(const struct site *site, const struct site_station *s, struct b
 }
 
 /* Warns of a head below its floor: then a surface is above it, and none under it. */
-static int check_floor(const struct site *site, uint32_t i, struct bvh_work *work, const struct sh_report *report,
-                       struct sh_err *err)
+static int check_floor(const struct site *site, uint32_t i, const struct sh_report *report, struct sh_err *err)
 {
     const struct site_station *s = &site->station[i];
     const double *p = s->at.position_m;
@@ -175,8 +174,8 @@ static int check_floor(const struct site *site, uint32_t i, struct bvh_work *wor
     const int rc = placement_level(&site->anchor, p, level, err);
     if (rc != SH_OK) return rc;
     const double up[3] = {level[2], level[5], level[8]}, down[3] = {-level[2], -level[5], -level[8]};
-    const double above_m = bvh_ray(work, site->bvh, p, up);
-    if (!isnan(above_m) && isnan(bvh_ray(work, site->bvh, p, down)))
+    const double above_m = bvh_ray(site->bvh, p, up);
+    if (!isnan(above_m) && isnan(bvh_ray(site->bvh, p, down)))
         sh_warn(
             report,
             "station %u %s at %.10g %.10g %.10g m: no surface below it, but one %.3g m above it: it may be under the "
@@ -268,7 +267,7 @@ static int check_stations(const struct site *site, const struct sh_report *repor
         if (!config_serves(site->cfg, i)) continue;
         check_reach(site, i, report);
         if (site->n_movers > 0) continue;
-        rc = check_floor(site, i, work, report, err);
+        rc = check_floor(site, i, report, err);
         if (rc == SH_OK) check_view(site, i, work, look, report);
     }
     bvh_work_free(work);

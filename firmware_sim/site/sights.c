@@ -57,16 +57,14 @@ int site_plan_sight(struct site *site, const struct sh_report *report, struct sh
     const char *why = why_not(site);
     struct site_look look;
     struct site_view view;
-    struct bvh_info bvh;
     if (asked == CHOICE_ON && why != NULL)
         return sh_fail(err, SH_EINPUT, "%s: cast.sight: on, but %s; allowed auto, off", cfg->file, why);
-    bvh_get_info(site->bvh, &bvh);
     site_look_open(&look, site);
     site_view_of(site, look.at[0].station, &view);
     const struct plan_sight_need need = {.pulses = pulses_of(&look.place[0], cfg->head.settings.frames),
                                          .share = site_view_share(&view, SQUARE_RAD),
                                          .n_triangles = site->scene->n_all,
-                                         .packet = bvh.packet,
+                                         .packet = bvh_get_info(site->bvh)->packet,
                                          .memory_bytes = memory_bytes(site),
                                          .forced = asked == CHOICE_AUTO ? -1 : asked == CHOICE_ON,
                                          .why_not = why};
@@ -157,7 +155,7 @@ int site_open_sights(struct site *site, uint32_t first, uint32_t n, const struct
     return rc;
 }
 
-void site_close_sights(struct site *site)
+void site_retire(const struct site *site)
 {
     for (uint32_t i = 0; i < site->n_stations; i++)
         close_sight(&site->station[i]);

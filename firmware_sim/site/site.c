@@ -95,8 +95,9 @@ const struct scene_texture *site_texture(const struct site *site, uint32_t label
     return number != 0 ? &scene->texture[number - 1] : NULL;
 }
 
-void site_move(const struct site *site, double t_s, struct cast_setup *setup)
+void site_move(const struct site *site, uint32_t station, double scan_s, struct cast_setup *setup)
 {
+    const double t_s = site->stop != NULL ? site->station[station].t_s : scan_s;
     setup->n_movers = site->n_movers;
     for (uint32_t k = 0; k < site->n_movers; k++) {
         const struct site_mover *m = &site->mover[k];
@@ -116,11 +117,6 @@ void site_move(const struct site *site, double t_s, struct cast_setup *setup)
             out->shift_m[i] = mesh->pivot_m[i] - vec3_dot(row, mesh->pivot_m) + mesh->move_m_s[i] * t;
         }
     }
-}
-
-double site_mover_time(const struct site *site, uint32_t station, double scan_s)
-{
-    return site->stop != NULL ? site->station[station].t_s : scan_s;
 }
 
 void site_grid(const struct site *site, int *zone, int *side)

@@ -289,10 +289,9 @@ void site_free_tripod(struct site_tripod *tripod);
 /* "legs of 1.8 m, top 1.6 m above the ground; opening 27.3 deg, ...", for a station with a tripod. */
 void site_describe_tripod(const struct site_station *station, char *text, size_t len);
 
-/* Sets the poses of all movers at t_s, a time of the scan. site_mover_time returns the t_s to give: at a stop movers
- * stand still, so it is the time of that stop; else scan_s. */
-void site_move(const struct site *site, double t_s, struct cast_setup *setup);
-double site_mover_time(const struct site *site, uint32_t station, double scan_s);
+/* Sets the poses of all movers at scan_s, a time of the scan from that station; at a stop movers stand still, so at the
+ * time of the stop. */
+void site_move(const struct site *site, uint32_t station, double scan_s, struct cast_setup *setup);
 
 /* Whether a direction, socs, lies within what the head of a station scans with the settings at power-up. Heads that
  * turn without a pan count with their whole field of view, as do spheres and lists. */

@@ -11,7 +11,6 @@
 /* ---- warnings.c: keeps the warnings given, so that a site beside this one only gives new ones */
 struct site_listener {
     struct sh_report report; /* pass this one to the steps of loading */
-    const struct sh_report *to;
     struct site_warnings *given;
     const struct site_warnings *before;
 };
@@ -109,7 +108,6 @@ int site_choose_methods(struct site *site, const struct sh_report *report, struc
 /* ---- sights.c: the visibility maps of stations */
 /* Called after beam and optics are chosen. Sets site->plan.methods.sight and the row. */
 int site_plan_sight(struct site *site, const struct sh_report *report, struct sh_err *err);
-void site_close_sights(struct site *site);
 /* Takes over another site's maps for stations that have the same position, attitude and BVH there. Then
  * site_open_sights makes the others. */
 void site_share_sights(struct site *site, const struct site *from);

@@ -177,8 +177,8 @@ static int make_legs(const struct site *site, struct site_station *s, const doub
     return SH_OK;
 }
 
-static int tripod_set_up(const struct site *site, struct site_station *s, uint32_t i, struct bvh_work *work,
-                         const struct sh_report *report, struct sh_err *err)
+static int tripod_set_up(const struct site *site, struct site_station *s, uint32_t i, const struct sh_report *report,
+                         struct sh_err *err)
 {
     struct site_tripod *t = &s->tripod;
     double level[9];
@@ -186,7 +186,7 @@ static int tripod_set_up(const struct site *site, struct site_station *s, uint32
     if (rc != SH_OK) return rc;
     for (int k = 0; k < 3; k++)
         t->cast.down[k] = -level[3 * k + 2];
-    t->head_m = bvh_ray(work, site->bvh, s->at.position_m, t->cast.down);
+    t->head_m = bvh_ray(site->bvh, s->at.position_m, t->cast.down);
     rc = open_legs(site, s, i, err);
     if (rc != SH_OK) return rc;
     const int cone = t->from->cone == CHOICE_ON || (t->from->cone == CHOICE_AUTO && !t->from->legs);
@@ -197,17 +197,14 @@ static int tripod_set_up(const struct site *site, struct site_station *s, uint32
 
 int site_set_up_tripods(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
-    struct bvh_work *work = NULL;
     int rc = SH_OK;
     for (uint32_t i = 0; i < site->n_stations && rc == SH_OK; i++) {
         struct site_station *s = &site->station[i];
         if (config_serves(site->cfg, i)) s->tripod.from = given(site, i);
         if (s->tripod.from == NULL) continue;
-        if (work == NULL) rc = bvh_work_create(&work, err);
-        if (rc == SH_OK) rc = tripod_set_up(site, s, i, work, report, err);
+        rc = tripod_set_up(site, s, i, report, err);
         if (rc == SH_OK) rc = sh_check_stop(report, err);
     }
-    bvh_work_free(work);
     return rc;
 }
 
@@ -215,16 +212,12 @@ int site_tripod_at(const struct site *site, uint32_t station, const double posit
                    struct sh_err *err)
 {
     struct site_station s;
-    struct bvh_work *work;
     memcpy(&s, &site->station[station], sizeof s);
     memcpy(s.at.position_m, position_m, sizeof s.at.position_m);
     s.tripod = (struct site_tripod){.from = s.tripod.from};
     *out = s.tripod;
     if (s.tripod.from == NULL) return SH_OK;
-    int rc = bvh_work_create(&work, err);
-    if (rc != SH_OK) return rc;
-    rc = tripod_set_up(site, &s, station, work, NULL, err);
-    bvh_work_free(work);
+    int rc = tripod_set_up(site, &s, station, NULL, err);
     *out = s.tripod;
     return rc;
 }

@@ -21,11 +21,6 @@ static double from_udeg(int64_t udeg)
     return angle_rad(1e-6 * (double)udeg);
 }
 
-static void add_band(struct site_view *view, const struct site_band *band)
-{
-    view->band[view->n++] = *band;
-}
-
 /* Adds the line angles from a to b of a head that pans. Up to 90 deg they are elevations; beyond, the beam looks
  * backward, over the zenith. Each half turn of the line angle is a band. */
 static void add_lines(struct site_view *view, double a_rad, double b_rad, double azimuth_rad, double azimuth_to_rad)
@@ -33,9 +28,9 @@ static void add_lines(struct site_view *view, double a_rad, double b_rad, double
     for (int k = (int)floor(a_rad / M_PI + 0.5); k * M_PI - M_PI_2 < b_rad && view->n < SITE_VIEW_BANDS; k++) {
         const double low = fmax(a_rad - k * M_PI, -M_PI_2), high = fmin(b_rad - k * M_PI, M_PI_2);
         if (k % 2 == 0)
-            add_band(view, &(struct site_band){low, high, azimuth_rad, azimuth_to_rad});
+            view->band[view->n++] = (struct site_band){low, high, azimuth_rad, azimuth_to_rad};
         else
-            add_band(view, &(struct site_band){-high, -low, azimuth_rad + M_PI, azimuth_to_rad});
+            view->band[view->n++] = (struct site_band){-high, -low, azimuth_rad + M_PI, azimuth_to_rad};
     }
 }
 
@@ -56,22 +51,21 @@ static void add_rings(struct site_view *view, const struct emitter *e, const str
 {
     const double start_rad = from_udeg(s->line_start_udeg), stop_rad = from_udeg(s->line_stop_udeg);
     const double to_rad = start_rad <= stop_rad ? stop_rad - start_rad : stop_rad - start_rad + 2.0 * M_PI;
-    add_band(view, &(struct site_band){angle_rad(360.0 * emitter_ring_turn(e, 0)),
-                                       angle_rad(360.0 * emitter_ring_turn(e, e->rings - 1)), start_rad + 0.5 * to_rad,
-                                       0.5 * to_rad});
+    view->band[view->n++] = (struct site_band){angle_rad(360.0 * emitter_ring_turn(e, 0)),
+                                               angle_rad(360.0 * emitter_ring_turn(e, e->rings - 1)),
+                                               start_rad + 0.5 * to_rad, 0.5 * to_rad};
 }
 
 /* The window of heads with beams is not used: it would save little. */
 static void add_emitter(struct site_view *view, const struct emitter *e, const struct head_settings *s)
 {
-    const struct site_band all = {-M_PI_2, M_PI_2, 0.0, M_PI};
-    if (e->kind == EMITTER_PLANAR) add_band(view, &(struct site_band){0.0, 0.0, 0.0, M_PI});
+    if (e->kind == EMITTER_PLANAR) view->band[view->n++] = (struct site_band){0.0, 0.0, 0.0, M_PI};
     for (uint32_t i = 0; e->kind == EMITTER_BEAMS && i < e->n_beams; i++) {
         const double elevation_rad = from_udeg(e->beam[i].elevation_udeg);
-        add_band(view, &(struct site_band){elevation_rad, elevation_rad, 0.0, M_PI});
+        view->band[view->n++] = (struct site_band){elevation_rad, elevation_rad, 0.0, M_PI};
     }
     if (e->kind == EMITTER_SPHERE) add_rings(view, e, s);
-    if (e->kind == EMITTER_DIRECTIONS) add_band(view, &all);
+    if (e->kind == EMITTER_DIRECTIONS) view->band[view->n++] = (struct site_band){-M_PI_2, M_PI_2, 0.0, M_PI};
 }
 
 void site_view_of(const struct site *site, uint32_t station, struct site_view *view)

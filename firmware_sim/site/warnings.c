@@ -22,25 +22,13 @@ static void warnings_warn(void *ctx, const char *text)
     if (given->n < SITE_MAX_WARNINGS && (given->text[given->n] = strdup(text)) != NULL) given->n++;
     if (has(listener->before, text)) return;
     if (given->n_new++ == 0) snprintf(given->first, sizeof given->first, "%s", text);
-    sh_warn(listener->to, "%s", text);
-}
-
-static void progress(void *ctx, const char *what, double fraction)
-{
-    const struct site_listener *listener = ctx;
-    sh_progress(listener->to, what, fraction);
-}
-
-static int loading_stops(void *ctx)
-{
-    const struct site_listener *listener = ctx;
-    return sh_stopped(listener->to);
+    sh_warn(listener->report.rest, "%s", text);
 }
 
 void site_listen(struct site_listener *listener, const struct sh_report *to, struct site_warnings *given,
                  const struct site_warnings *before)
 {
-    *listener = (struct site_listener){{listener, warnings_warn, progress, loading_stops}, to, given, before};
+    *listener = (struct site_listener){{.ctx = listener, .warn = warnings_warn, .rest = to}, given, before};
 }
 
 void site_free_warnings(struct site_warnings *given)

@@ -230,7 +230,7 @@ static struct sight *make_sight(const struct beam_rig *rig, const struct beam_vi
         fprintf(stderr, "%s\n", err.text);
         exit(1);
     }
-    sight_get_info(sight, &info);
+    info = *sight_get_info(sight);
     if (!as_chart)
         printf("  sight: %u cells, one %.4f, nothing %.4f, few %.4f, ask %.4f; built in %.1f ms\n", info.cells,
                info.one, info.nothing, info.few, info.ask, 1e3 * info.build_s);

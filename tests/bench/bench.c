@@ -86,7 +86,7 @@ static int measure_target(const struct bench_options *o, const struct bench_targ
         out->triangles = target->scene->n_triangles;
         out->load_s = target->load_s;
         out->embree_build_s = embree.build_s;
-        bvh_get_info(c.bvh, &out->info);
+        out->info = *bvh_get_info(c.bvh);
         if (!o->only_sight) rc = measure_stages(o, &c, out, err);
         if (rc == SH_OK) rc = measure_sights(o, &c, out, err);
     }

@@ -285,7 +285,7 @@ static int set_up(struct chart *c, struct sh_err *err)
     if (rc == SH_OK) rc = make_sight(c, &cost_s, err);
     if (rc != SH_OK) return rc;
     if (c->spec->at_edges) aim_at_edges(c);
-    bvh_get_info(c->bvh, &info);
+    info = *bvh_get_info(c->bvh);
     c->native = info.packet;
     c->range_m = aligned_alloc(64, c->rays.n * sizeof *c->range_m);
     c->prim = aligned_alloc(64, c->rays.n * sizeof *c->prim);

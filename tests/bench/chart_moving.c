@@ -360,7 +360,7 @@ static int draw(int body, struct sh_err *err)
     double *truth_m = rc == SH_OK ? true_ranges(&w) : NULL;
     if (rc == SH_OK && truth_m == NULL) rc = sh_fail(err, SH_ENOMEM, "no memory");
     if (rc == SH_OK) {
-        bvh_get_info(w.bvh, &info);
+        info = *bvh_get_info(w.bvh);
         for (int i = 0; i < METHODS; i++)
             measure_error(&w, &w.method[i], truth_m);
         measure(&w);

@@ -64,7 +64,7 @@ int bench_scan_plan(const struct bench_scan *scan, const struct bvh *bvh, const 
     schedule_start(&place.segment, &spec);
     memcpy(place.setup.station_m, station_m, sizeof place.setup.station_m);
     pose_heading(0.0, place.setup.rotation);
-    bvh_get_info(bvh, &info);
+    info = *bvh_get_info(bvh);
     const struct plan_sight_need need = {.pulses = (double)scan->pulses,
                                          .share = share(),
                                          .n_triangles = bvh_scene(bvh)->n_triangles,

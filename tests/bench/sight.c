@@ -279,7 +279,7 @@ static int run(struct rows *r, struct sh_err *err)
     r->out->plan_s = bench_process_s() - start_s;
     if (rc == SH_OK) rc = build(r, 0, err);
     if (rc != SH_OK) return rc;
-    sight_get_info(r->sight, &r->out->info);
+    r->out->info = *sight_get_info(r->sight);
     compare(r);
     for (uint32_t round = 0; round < BENCH_SIGHT_ROUNDS; round++) {
         rc = round_of(r, round, err);

@@ -205,7 +205,7 @@ static int load(struct reach_run *run, const char *path, struct sh_err *err)
     run->load_s = process_s() - start_s;
     for (uint32_t k = 0; k <= run->site->n_movers; k++) {
         const struct bvh *bvh = k == 0 ? run->site->bvh : run->site->mover[k - 1].bvh;
-        bvh_get_info(bvh, &info);
+        info = *bvh_get_info(bvh);
         run->bytes += info.bytes;
         run->triangles += bvh_scene(bvh)->n_triangles;
     }

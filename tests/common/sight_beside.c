@@ -21,7 +21,7 @@ int sight_beside_create(const struct sight_spec *spec, struct sight_beside *out,
     memcpy(out->station_m, spec->station_m, sizeof out->station_m);
     int rc = sight_create(spec, 1, NULL, &out->sight, err);
     if (rc != SH_OK) return rc;
-    sight_get_info(out->sight, &out->info);
+    out->info = *sight_get_info(out->sight);
     return take_works(out, err);
 }
 

@@ -103,7 +103,7 @@ static void count_warning(void *ctx, const char *text)
     (void)text;
     warnings++;
 }
-static const struct sh_report REPORT = {NULL, count_warning, NULL, NULL};
+static const struct sh_report REPORT = {.warn = count_warning};
 
 static struct seen read_all(void)
 {

@@ -140,7 +140,7 @@ static void the_width_of_packets_does_not_matter(void **state)
         for (size_t w = 0; w < 4; w++) {
             struct bvh_info info;
             bvh_set_packet(rig->bvh, width[w]);
-            bvh_get_info(rig->bvh, &info);
+            info = *bvh_get_info(rig->bvh);
             assert_true(info.packet == width[w] || (info.packet == 1 && width[w] > 4)); /* SSE has packets of 4 */
             uint32_t echoes = cast_line(rig, n, &line);
             const uint32_t *out[] = {rig->block.a, rig->block.b, rig->block.c};

@@ -149,7 +149,7 @@ static void expect_same_bytes(struct cast_rig *rig)
     static const uint32_t widths[] = {0, 16, 8, 4, 1}; /* 0: the native one */
     static const uint32_t cuts[] = {RIG_LINE, 16, 2048, 48};
     struct bvh_info info;
-    bvh_get_info(rig->bvh, &info);
+    info = *bvh_get_info(rig->bvh);
     uint64_t want = 0;
     for (int w = 0; w < 5; w++) {
         if (widths[w] > info.packet) continue;

@@ -96,7 +96,7 @@ static void take_warning(void *ctx, const char *text)
 
 static void expect_warnings(const uint8_t *las, size_t len, int n)
 {
-    static const struct sh_report report = {NULL, take_warning, NULL, NULL};
+    static const struct sh_report report = {.warn = take_warning};
     struct cloud cloud;
     struct sh_err err = {0};
     write_bytes(las, len);

@@ -294,11 +294,10 @@ static void planes_of_copies(void **state)
     static const double here[3] = {0, 0, 0};
     struct scene_place place[PLACES];
     struct pair p;
-    double origin_m[3];
     state_now = 12;
     scatter(place, here);
     open_pair(&p, place, PLACES, 0, here);
-    bvh_origin(p.bvh[0], origin_m);
+    const double *origin_m = bvh_origin(p.bvh[0]);
     assert_int_equal(scene_n_kept(p.scene[0]), 2 + 24); /* the ground, and one tree */
     for (uint32_t t = 0; t < p.scene[0]->n_all; t++) {
         struct bvh_plane plane;
@@ -371,7 +370,7 @@ static void copies_take_memory(void **state)
         struct scene *scene = load_one(place, k == 0 ? 2 : PLACES, 0, (const double[3]){0, 0, 0});
         struct bvh *bvh;
         if (bvh_create(scene, 1, NULL, &bvh, &err) != SH_OK) fail_msg("%s", err.text);
-        bvh_get_info(bvh, &info);
+        info = *bvh_get_info(bvh);
         own[k] = (int64_t)info.bytes - bvh->bytes;
         bvh_free(bvh);
         scene_free(scene);

@@ -401,10 +401,8 @@ static void one_ray_passes_through_holes(void **state)
     quad("board", 10, 2, 0);
     struct scene *scene = end_obj(0, 1);
     struct bvh *bvh = made_bvh(scene);
-    struct bvh_work *work = made_bvh_work();
-    assert_true(fabs(bvh_ray(work, bvh, hole, y) - 20.0) < 1e-9);
-    assert_true(fabs(bvh_ray(work, bvh, solid, y) - 10.0) < 1e-9);
-    bvh_work_free(work);
+    assert_true(fabs(bvh_ray(bvh, hole, y) - 20.0) < 1e-9);
+    assert_true(fabs(bvh_ray(bvh, solid, y) - 10.0) < 1e-9);
     bvh_free(bvh);
     scene_free(scene);
 }

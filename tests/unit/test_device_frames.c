@@ -47,7 +47,7 @@ static void a_descriptor_has_what_is_set(void **state)
     scan.lines_uhz = 60 * MICRO;
     memset(&d, 0xee, sizeof d);
     device_fill_descriptor(&scan, idn, 0, &d);
-    bvh_get_info(site->bvh, &info);
+    info = *bvh_get_info(site->bvh);
     assert_string_equal(d.idn, "A,B,C,D");
     assert_string_equal(d.profile, "riegl-vz400i");
     assert_true(d.layout == NATIVE_POLAR && d.isa == info.packet && d.isa >= 1 && d.isa <= 16);

@@ -59,13 +59,13 @@ static int stop(void *ctx)
     return ((struct seen *)ctx)->stops;
 }
 
-/* Each member may be missing, and so may the report. */
+/* Each member may be missing, and so may the report. What a report does not take goes to the one below it. */
 static void reports(void **state)
 {
     (void)state;
     struct seen seen = {.fraction = -2.0};
     struct sh_err err;
-    const struct sh_report all = {&seen, warn, progress, stop}, none = {.ctx = &seen};
+    const struct sh_report all = {&seen, warn, progress, stop, NULL}, none = {.ctx = &seen}, over = {.rest = &all};
     sh_warn(&all, "%d\n", 5);
     assert_string_equal(seen.warned, "5?");
     sh_progress(&all, "reading", 0.5);
@@ -77,11 +77,17 @@ static void reports(void **state)
     assert_int_equal(err.code, SH_ESTOPPED);
     assert_string_equal(err.text, "stopped while loading; no scan was run");
     assert_int_equal(sh_check_stop(NULL, &err), SH_OK);
+    assert_true(sh_stopped(&over));
+    sh_warn(&over, "below");
+    assert_string_equal(seen.warned, "below");
+    sh_progress(&over, "writing", 0.75);
+    assert_string_equal(seen.what, "writing");
     sh_warn(&none, "x");
     sh_warn(NULL, "x");
     sh_progress(&none, "x", 1.0);
     sh_progress(NULL, "x", 1.0);
-    assert_string_equal(seen.warned, "5?");
+    assert_string_equal(seen.warned, "below");
+    assert_string_equal(seen.what, "writing");
 }
 
 /* Limits are rounded towards the side that is allowed. A figure that already has few digits stays as it is. */

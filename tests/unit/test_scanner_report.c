@@ -35,7 +35,7 @@ static int is_to_stop(void *ctx)
     return stops;
 }
 
-static const struct sh_report to = {NULL, keep, note_progress, is_to_stop};
+static const struct sh_report to = {.warn = keep, .progress = note_progress, .stop = is_to_stop};
 static struct scanner_report report[3];
 static struct scanner_warnings warnings;
 

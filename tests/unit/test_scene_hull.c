@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* Bounds of turned copies, from the hull of their mesh: those of all vertices of its triangles, however these lie. */
+/* Bounds of turned copies, from the hull of their mesh: those of all vertices of its triangles, however these lie. The
+ * scene's bounds hold them all. */
 #include <math.h>
 
 #include "core/scene/hull.h"
 #include "core/vec3.h"
 #include "tests/common/made.h"
 
-enum { MOST = 60 };
+enum { MOST = 60, COPIES = 8 };
 
 /* Places are small whole numbers, so that many share an axis, lie on one line or at one place. */
 static void bounds_are_those_of_all_vertices(void **state)
@@ -27,26 +28,35 @@ static void bounds_are_those_of_all_vertices(void **state)
         const struct scene_arrays arrays = {
             (const double(*)[3])vertex_m, n, (const uint32_t(*)[3])triangle, n / 3, NULL, NULL, 0};
         struct scene *mesh;
-        struct scene_hull hull;
+        struct scene_copy copy[COPIES];
+        struct scene scene;
         struct sh_err err;
         if (scene_from_arrays(&arrays, &mesh, &err) != SH_OK) continue; /* no triangle has an area */
-        assert_int_equal(scene_find_hull(mesh, &hull, &err), SH_OK);
-        for (int k = 0; k < 8; k++) {
+        for (int k = 0; k < COPIES; k++) {
             const double angle = k < 4 ? k * M_PI_2 : 6.28 * case_unit(&seed);
-            struct scene_copy copy = {.shift_m = {10, 20, 30}, .scale = 1.5, .cosine = cos(angle), .sine = sin(angle)};
+            copy[k] =
+                (struct scene_copy){.shift_m = {10, 20, 30}, .scale = 1.5, .cosine = cos(angle), .sine = sin(angle)};
+        }
+        vec3_bound_nothing(scene.min_m, scene.max_m);
+        assert_int_equal(scene_bound_copies(&scene, mesh, copy, COPIES, NULL, &err), SH_OK);
+        double all_min[3], all_max[3];
+        vec3_bound_nothing(all_min, all_max);
+        for (int k = 0; k < COPIES; k++) {
             double min[3], max[3], p[3];
             vec3_bound_nothing(min, max);
             for (uint32_t i = 0; i < 3 * mesh->n_triangles; i++) {
-                scene_copy_put(&copy, mesh->vertex_m[mesh->triangle[i / 3][i % 3]], p);
+                scene_copy_put(&copy[k], mesh->vertex_m[mesh->triangle[i / 3][i % 3]], p);
                 vec3_bound(min, max, p);
             }
-            scene_set_copy_bounds(mesh, &hull, &copy);
+            vec3_bound(all_min, all_max, copy[k].min_m);
+            vec3_bound(all_min, all_max, copy[k].max_m);
             for (int a = 0; a < 3; a++)
-                if (!(fabs(copy.min_m[a] - min[a]) < 1e-12 && fabs(copy.max_m[a] - max[a]) < 1e-12))
-                    fail_msg("%d, %u vertices, %g: %g to %g, not %g to %g", turn, n, angle, copy.min_m[a],
-                             copy.max_m[a], min[a], max[a]);
+                if (!(fabs(copy[k].min_m[a] - min[a]) < 1e-12 && fabs(copy[k].max_m[a] - max[a]) < 1e-12))
+                    fail_msg("%d, %u vertices, copy %d: %g to %g, not %g to %g", turn, n, k, copy[k].min_m[a],
+                             copy[k].max_m[a], min[a], max[a]);
         }
-        scene_free_hull(&hull);
+        assert_memory_equal(scene.min_m, all_min, sizeof all_min);
+        assert_memory_equal(scene.max_m, all_max, sizeof all_max);
         scene_free(mesh);
     }
 }

@@ -149,7 +149,7 @@ static void each_cell_says_what_is_there(void **state)
     for (int face = 0; face < FACES; face++)
         count(face, &want);
     assert_true(want.one > 1000 && want.several > 500 && want.one + want.nothing + want.several == (uint32_t)all);
-    sight_get_info(sight, &info);
+    info = *sight_get_info(sight);
     assert_int_equal(info.cells, CELLS);
     assert_int_equal(lround(info.one * all), want.one);
     assert_int_equal(lround(info.nothing * all), want.nothing);
@@ -176,13 +176,13 @@ static void the_memory_holds(void **state)
     struct bvh *bvh = made_bvh(scene);
     struct sight_info info;
     struct sight *sight = make_map(bvh, ENOUGH);
-    sight_get_info(sight, &info);
+    info = *sight_get_info(sight);
     sight_free(sight);
     const uint64_t enough = info.peak_bytes;
     int coarser = 0, asks = 0;
     for (uint64_t memory_bytes = enough; memory_bytes > enough / 16; memory_bytes -= enough / 32) {
         sight = make_map(bvh, memory_bytes);
-        sight_get_info(sight, &info);
+        info = *sight_get_info(sight);
         sight_free(sight);
         assert_true(info.peak_bytes <= memory_bytes);
         assert_int_equal(info.cells == CELLS && info.ask == 0.0, memory_bytes == enough);
@@ -191,7 +191,7 @@ static void the_memory_holds(void **state)
     }
     assert_true(coarser > 0 && asks > 0);
     sight = make_map(bvh, enough - 1);
-    sight_get_info(sight, &info);
+    info = *sight_get_info(sight);
     sight_free(sight);
     assert_int_equal(info.cells, CELLS / 2);
     bvh_free(bvh);
@@ -207,7 +207,7 @@ static void unused_room_is_given_back(void **state)
     struct bvh *bvh = made_bvh(scene);
     struct sight *sight = make_map(bvh, ENOUGH);
     struct sight_info info;
-    sight_get_info(sight, &info);
+    info = *sight_get_info(sight);
     assert_true(malloc_usable_size(sight->leaf) + malloc_usable_size(sight->list) + malloc_usable_size(sight->record) <
                 info.bytes + 3 * 4096);
     sight_free(sight);

@@ -145,7 +145,7 @@ static void test_made_by_station(void **state)
     assert_int_equal(site_open_sights(site, 0, 3, NULL, &err), SH_OK); /* the one there is stays */
     assert_ptr_equal(setup.sight, site->station[1].sight);
     for (uint32_t i = 0; i < 3; i += 2) { /* together they take no more than sight_mib */
-        sight_get_info(site->station[i].sight, &info);
+        info = *sight_get_info(site->station[i].sight);
         assert_true(info.bytes <= 2 << 20);
     }
     site_free(site);

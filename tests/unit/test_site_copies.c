@@ -101,7 +101,7 @@ static void cast_lines(const struct site *site, double t_s, struct lines *out)
     site_fill_spec(site, &cfg->head.settings, &spec);
     schedule_start(&segment, &spec);
     site_cast_setup(site, 0, &setup);
-    site_move(site, t_s, &setup);
+    site_move(site, 0, t_s, &setup);
     out->n = 0;
     for (uint64_t i = 0; i < CAST_LINES; i++) {
         struct schedule_line line;

@@ -87,7 +87,7 @@ static struct seen cast(const struct site *site, double near)
     if (caster_create(&caster, &err) != SH_OK || line_block_alloc(&block, 40000, &err) != SH_OK)
         fail_msg("%s", err.text);
     site_cast_setup(site, 0, &setup);
-    site_move(site, 0.0, &setup);
+    site_move(site, 0, 0.0, &setup);
     for (uint64_t l = 0; l < 8; l++) {
         struct schedule_line line;
         struct schedule_run run;

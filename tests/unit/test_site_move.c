@@ -87,7 +87,7 @@ static void look(const struct site *site, double t_s, struct look *out)
     site_cast_setup(site, 0, &setup);
     static const double side[9] = {0, 0, 1, 0, 1, 0, -1, 0, 0};
     memcpy(setup.rotation, side, sizeof side);
-    site_move(site, t_s, &setup);
+    site_move(site, 0, t_s, &setup);
     schedule_start(&segment, &spec);
     schedule_get_line(&segment, 0, &line);
     schedule_get_run(&segment, &line, 0, RAYS, &run);

@@ -181,7 +181,7 @@ static void a_pulse_costs_all_that_it_meets(void **state)
     const char *const sets[] = {mover_setting(), "signal.model=on", "waveform.send=on"};
     struct bvh_info bvh;
     plan("profile: any-rate", STATION);
-    bvh_get_info(site->bvh, &bvh);
+    bvh = *bvh_get_info(site->bvh);
     const double alone_ns = site_planned_ns(site);
     plan_with("profile: any-rate", STATION, sets, 1);
     assert_int_equal(site->n_movers, 1);

@@ -118,11 +118,8 @@ static struct scene *make_house(const double shift_m[3])
 static double first_along(const struct scene *scene, const double from[3], const double dir[3])
 {
     struct bvh *bvh;
-    struct bvh_work *work;
-    if (bvh_create(scene, 1, NULL, &bvh, &err) != SH_OK || bvh_work_create(&work, &err) != SH_OK)
-        fail_msg("%s", err.text);
-    const double range_m = bvh_ray(work, bvh, from, dir);
-    bvh_work_free(work);
+    if (bvh_create(scene, 1, NULL, &bvh, &err) != SH_OK) fail_msg("%s", err.text);
+    const double range_m = bvh_ray(bvh, from, dir);
     bvh_free(bvh);
     return range_m;
 }

@@ -67,7 +67,7 @@ static void scan(const struct site *site, uint32_t station)
     spec.frames = 1;
     schedule_start(&seg, &spec);
     site_cast_setup(site, station, &setup);
-    site_move(site, 0.0, &setup);
+    site_move(site, 0, 0.0, &setup);
     assert_int_equal(caster_create(&caster, &err), SH_OK);
     assert_int_equal(line_block_alloc(&block, 65536, &err), SH_OK);
     for (uint64_t n = 0;; n++) {

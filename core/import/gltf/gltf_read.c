@@ -110,7 +110,7 @@ int import_gltf(struct scene_build *b, struct sh_err *err)
 {
     struct gltf g = {.b = b, .err = err};
     struct stat st;
-    if (stat(b->spec->file, &st) == 0 && st.st_size > 8 << 20) build_announce(b);
+    if (stat(b->spec->file, &st) == 0 && st.st_size > 8 << 20) build_report(b, -1);
     int rc = gltf_open(&g);
     if (rc == SH_OK && !g.by_assimp) rc = check_extensions(&g);
     const bool by_assimp = g.by_assimp;

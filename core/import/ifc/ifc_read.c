@@ -200,7 +200,7 @@ static int read_by_two(struct reading *r)
     size_t n_edits;
     int rc = check_number(r);
     if (rc != SH_OK) return rc;
-    build_announce(r->b);
+    build_report(r->b, -1);
     char *edits = ifc_edits_write(&r->records.edits, &r->records.index.text, &n_edits);
     if (edits == NULL) return ifc_no_memory(&r->records.index, r->err);
     rc = ifc_run_readers(r->b, fineness, (struct text_span){edits, n_edits}, &r->readings, r->err);

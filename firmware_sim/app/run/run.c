@@ -15,11 +15,10 @@ static void say_sights(const struct site *site)
     double build_s = 0.0, mib = 0.0;
     unsigned n = 0;
     for (uint32_t i = 0; i < site->n_stations; i++) {
-        struct sight_info info;
         if (site->station[i].sight == NULL) continue;
-        sight_get_info(site->station[i].sight, &info);
-        build_s += info.build_s;
-        mib += 0x1p-20 * (double)info.bytes;
+        const struct sight_info *info = sight_get_info(site->station[i].sight);
+        build_s += info->build_s;
+        mib += 0x1p-20 * (double)info->bytes;
         n++;
     }
     if (n == 0) return;
@@ -40,11 +39,10 @@ static void say_stored(const struct config *cfg, struct settings_file *settings)
 
 static void say_what_runs(const struct config *cfg, const struct site *site, const struct loop *loop)
 {
-    struct bvh_info info;
-    bvh_get_info(site->bvh, &info);
+    const struct bvh_info *info = bvh_get_info(site->bvh);
     app_say("%s %s, %s, %u triangles, %u surfaces; BVH in %.2f s, %.0f bytes per triangle, packets of %u",
             cfg->profile.maker, cfg->profile.model, cfg->profile.name, site->scene->n_all, site->scene->n_surfaces,
-            info.build_s, (double)info.bytes / (double)scene_n_kept(site->scene), info.packet);
+            info->build_s, (double)info->bytes / (double)scene_n_kept(site->scene), info->packet);
     if (!config_is_alone(cfg))
         app_say("it is the scanner of %u of %u stations; --set head.station=N serves the scanner of another station",
                 site_n_served(site), site->n_stations);

@@ -41,7 +41,7 @@ struct coverage_run {
 static void enter(void *ctx, int64_t t_ns, struct cast_setup *setup)
 {
     const struct coverage_scan_at *at = ctx;
-    site_move(at->site, site_mover_time(at->site, at->station, 1e-9 * (double)t_ns), setup);
+    site_move(at->site, at->station, 1e-9 * (double)t_ns, setup);
 }
 
 void coverage_scan_of(const struct site *site, uint32_t station, struct coverage_scan_at *at)

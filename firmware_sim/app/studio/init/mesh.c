@@ -195,7 +195,7 @@ static int read_mesh(const struct scene_mesh_spec *spec, struct scene **scene, s
     size_t size;
     FILE *kept = open_memstream(&warnings, &size);
     if (kept == NULL) return sh_fail(why, SH_ENOMEM, "no memory");
-    const struct sh_report keep = {.ctx = kept, .warn = keep_warning, .progress = all->progress, .stop = all->stop};
+    const struct sh_report keep = {.ctx = kept, .warn = keep_warning, .rest = all};
     const int rc = scene_load(spec, 1, INFINITY, &keep, scene, why);
     fclose(kept);
     for (rest = warnings; rc != SH_OK && (line = strsep(&rest, "\n")) != NULL;)

@@ -147,7 +147,7 @@ static int record(struct record_job *r, struct scanhead *sh, struct sh_err *err)
     struct recording_result *result = &r->result;
     r->recording.hash = (r->hash || r->stats != NULL) && !r->no_hash;
     r->notes = (struct sh_report){r, r->silent ? NULL : print_note,
-                                  r->recording.progress ? app_report_seconds.progress : NULL, gives_up};
+                                  r->recording.progress ? app_report_seconds.progress : NULL, gives_up, NULL};
     r->files.recorder.report = &r->notes;
     int rc = open_files(r, err);
     if (rc != SH_OK) {

@@ -51,7 +51,7 @@ static const struct bvh *body_of(void *ctx, unsigned station, uint16_t label, do
     for (; label >= first + site->mover[k].scene->n_surfaces; k++)
         first += site->mover[k].scene->n_surfaces;
     struct cast_setup setup;
-    site_move(site, site_mover_time(site, station - 1, 0.0), &setup);
+    site_move(site, station - 1, 0.0, &setup);
     const struct cast_mover *at = &setup.mover[k];
     const double d[3] = {p_prcs[0] - at->shift_m[0], p_prcs[1] - at->shift_m[1], p_prcs[2] - at->shift_m[2]};
     mat3_apply_transposed(at->rotation, d, p_prcs);

@@ -41,7 +41,7 @@ static int make_parts(const struct watch *w, struct parts *parts, struct sh_err 
     const uint32_t most = w->options.scene_triangles;
     struct cast_setup setup;
     int rc = make_part(site->scene, most, w->options.report, parts, err);
-    if (site->n_movers > 0) site_move(site, site_mover_time(site, 0, 0.0), &setup);
+    if (site->n_movers > 0) site_move(site, 0, 0.0, &setup);
     for (uint32_t k = 0; k < site->n_movers && rc == SH_OK; k++) {
         rc = make_part(site->mover[k].scene, most / BODY_PART, w->options.report, parts, err);
         struct decimated *m = &parts->part[k + 1];
