@@ -85,18 +85,15 @@ int app_fail_config(const struct config_diagnostics *diagnostics)
     return status;
 }
 
-int app_with_links(const struct app_input *in, const char *links,
-                   int (*work)(struct config *cfg, void *ctx, struct sh_err *err), void *ctx)
+int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, void *ctx, struct sh_err *err),
+                    void *ctx)
 {
     struct sh_err err = {0};
     struct config_diagnostics diagnostics;
     struct config *cfg = calloc(1, sizeof *cfg);
-    if (cfg == NULL) {
-        sh_fail(&err, SH_ENOMEM, "no memory");
-        return app_fail(&err);
-    }
-    int rc = links != NULL ? config_load_links(links, "--link", in->sets.set, in->sets.n, cfg, &diagnostics)
-                           : config_load_all(in->operand[0], in->sets.set, in->sets.n, cfg, &diagnostics);
+    if (cfg == NULL) return app_fail(&(struct sh_err){SH_ENOMEM, "no memory"});
+    int rc = in->links != NULL ? config_load_links(in->links, "--link", in->sets.set, in->sets.n, cfg, &diagnostics)
+                               : config_load_all(in->operand[0], in->sets.set, in->sets.n, cfg, &diagnostics);
     if (rc != SH_OK || (in->scenario != NULL && config_add_scenario(cfg, in->scenario, &diagnostics) != SH_OK)) {
         free(cfg);
         return app_fail_config(&diagnostics);
@@ -105,12 +102,6 @@ int app_with_links(const struct app_input *in, const char *links,
     if (rc == SH_OK) rc = work(cfg, ctx, &err);
     free(cfg);
     return rc == SH_OK ? APP_OK : app_fail(&err);
-}
-
-int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, void *ctx, struct sh_err *err),
-                    void *ctx)
-{
-    return app_with_links(in, NULL, work, ctx);
 }
 
 void app_warn_settings_file(const struct config *cfg, const char *why)

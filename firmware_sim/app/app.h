@@ -41,15 +41,11 @@ int app_fail(const struct sh_err *err);
 /* The same for the first CONFIG_MAX_DIAGNOSTICS errors of a configuration; a last line counts the others. */
 int app_fail_config(const struct config_diagnostics *diagnostics);
 
-/* Loads the configuration that the first operand names, with settings and scenario, and gives it to `work`. `work` may
+/* Loads the configuration that the first operand names, or in->links, with settings and scenario, and gives it to `work`. `work` may
  * change the configuration, which is freed afterwards. Returns the exit status. The reason of a failure is printed,
  * errors of a configuration as by app_fail_config. */
 int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, void *ctx, struct sh_err *err),
                     void *ctx);
-/* The same for `links`, YAML that --link gives in place of a configuration. NULL: as app_with_config. */
-int app_with_links(const struct app_input *in, const char *links,
-                   int (*work)(struct config *cfg, void *ctx, struct sh_err *err), void *ctx);
-
 /* Takes the results of two pieces of work: `rc` of the first, whose reason is in err, and `more` of the second, whose
  * reason is in `why`. Returns the first failure, with its text in err. If both failed, the second text is printed as a
  * warning, unless it is the same. */

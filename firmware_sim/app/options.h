@@ -125,6 +125,7 @@ struct app_input {
     struct app_file file[APP_MAX_FILES];
     int n_files;
     int opens_links;      /* as the command says */
+    const char *links;    /* YAML that --link gives in place of a configuration; NULL: none */
     const char *scenario; /* a file whose faults are added to those of the configuration; NULL: none */
 };
 

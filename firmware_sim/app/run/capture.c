@@ -193,7 +193,8 @@ static int with_links(struct capture_run *run)
     else
         default_links(run, links, sizeof links);
     snprintf(text, sizeof text, "links:%s%s", links[0] != '\0' ? "\n" : " []", links);
-    return app_with_links(&o->in, text, serve, run);
+    o->in.links = text;
+    return app_with_config(&o->in, serve, run);
 }
 
 int run_capture(struct run_options *o)
