@@ -213,7 +213,7 @@ static const double UNKNOWN[3] = {1.5, 2.5, -3.5};
 
 static void points(void **state)
 {
-    struct match m = {
+    struct verdict_points m = {
         .empty = 1, .n = 20, .sent = 30, .again = 14, .frame = "head", .unit_m = 0.001, .within_m = 0.002};
     (void)state;
     begin();
@@ -239,7 +239,7 @@ static void points(void **state)
     expect(VERDICT_POINTS_ONCE, NO, "most of its points are unknown");
     const struct verdict_points *p = &v.points;
     assert_true(p->n == 20 && p->empty == 1 && p->unknown == 11 && p->repeated == 4 && p->sent == 30);
-    assert_true(p->unit_m == 0.001 && p->match_m == 0.002);
+    assert_true(p->unit_m == 0.001 && p->within_m == 0.002);
     checks_no_points(&v, FOUND, "it has no point");
     expect(VERDICT_POINTS_READ, FOUND, "it has no point");
     expect(VERDICT_POINTS_KNOWN, NO, "its points can't be read");
@@ -255,7 +255,14 @@ static void make_sheet(void)
 {
     v = (struct verdict){.scenario = "so<me",
                          .log = "a.log",
-                         .points = {1, 2, 3, 4, 5, 6.5, 7.5, "head"},
+                         .points = {.n = 1,
+                                    .empty = 2,
+                                    .unknown = 3,
+                                    .repeated = 4,
+                                    .sent = 5,
+                                    .unit_m = 6.5,
+                                    .within_m = 7.5,
+                                    .frame = "head"},
                          .figures = {.wall_s = 11.5,
                                      .connected_s = 12.5,
                                      .back_mean_s = 13.5,

@@ -161,7 +161,7 @@ static void match_take(void *ctx, size_t entry)
         match_index_join(taker->index, taker->first, entry);
 }
 
-static void count_groups(const struct match_index *index, struct match *m)
+static void count_groups(const struct match_index *index, struct verdict_points *m)
 {
     for (size_t i = 0; i < index->n; i++) {
         const struct match_entry *e = &index->entry[i];
@@ -174,8 +174,8 @@ static void count_groups(const struct match_index *index, struct match *m)
 
 /* With a large distance each point agrees with very many others, and takes long. So the loop often asks whether to
  * stop. */
-static int count_points(struct match_index *index, const struct match_input *in, const struct way *way, struct match *m,
-                        struct sh_err *err)
+static int count_points(struct match_index *index, const struct match_input *in, const struct way *way,
+                        struct verdict_points *m, struct sh_err *err)
 {
     const struct cloud *cloud = in->cloud;
     int rc = SH_OK;
@@ -258,12 +258,12 @@ static double rounding_m(double limit_m)
     return fmax(4.0 * DBL_EPSILON * limit_m, 1e-9);
 }
 
-int match_points(const struct match_input *in, struct match *match, struct sh_err *err)
+int match_points(const struct match_input *in, struct verdict_points *match, struct sh_err *err)
 {
     const double limit_m = limit_of(in->stream);
     struct match_index index = {0};
     struct way ways[MAX_WAYS];
-    *match = (struct match){.unit_m = match_unit_m(in->cloud, limit_m)};
+    *match = (struct verdict_points){.unit_m = match_unit_m(in->cloud, limit_m)};
     match->within_m = index.within_m = fmax(match->unit_m + in->match_m, rounding_m(limit_m));
     int rc = index_stream(in, &index, err);
     if (rc == SH_OK) {
