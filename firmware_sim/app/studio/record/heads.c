@@ -99,15 +99,6 @@ int heads_prepare(struct heads *heads, uint32_t station, struct sh_err *err)
     return offline_prepare(&heads->at->offline, station, heads->report, err);
 }
 
-/* All members of these structs are counts of 64 bits. */
-static void add_stream(struct scanhead_stats *sum, const struct scanhead_stats *more)
-{
-    uint64_t *to = (uint64_t *)(void *)sum;
-    const uint64_t *from = (const uint64_t *)(const void *)more;
-    for (size_t i = 0; i < sizeof *sum / sizeof *to; i++)
-        to[i] += from[i];
-}
-
 /* The hash of several streams is that of their hashes, as text, in the order of their heads. */
 static void add_streams(const struct heads *heads, int hash, struct recording_result *sum)
 {
@@ -120,7 +111,7 @@ static void add_streams(const struct heads *heads, int hash, struct recording_re
         struct scanhead_stats stats;
         if (sh == NULL) continue;
         scanhead_get_stats(sh, &stats);
-        add_stream(&sum->stream, &stats);
+        recording_add_counts(&sum->stream, &stats, sizeof stats);
         scanhead_hash_hex(sh, hex);
         sha256_update(&ctx, 64, (const uint8_t *)hex);
     }

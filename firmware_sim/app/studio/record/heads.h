@@ -11,7 +11,7 @@
 
 #include "firmware_sim/app/studio/record/offline.h"
 #include "firmware_sim/app/studio/record/recording.h"
-#include "firmware_sim/app/sites.h"
+#include "firmware_sim/app/scanner_report.h"
 
 struct heads_one {
     struct config *cfg;

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* The arrays of points: room for them, their columns by number. */
-#include <stdlib.h>
 #include <string.h>
 
 #include "core/grow.h"

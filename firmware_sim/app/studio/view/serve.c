@@ -2,7 +2,6 @@
 #include "firmware_sim/app/studio/view/serve.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "firmware_sim/app/studio/page_json.h"
