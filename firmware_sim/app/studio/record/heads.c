@@ -85,8 +85,8 @@ int heads_open(struct heads *heads, struct site *site, double scan_s, const stru
     heads->at = one;
     heads->first = &one->offline;
     one->is_open = 1;
-    return site != NULL ? offline_open_at(site, scan_s, report, &one->offline, err)
-                        : offline_open(one->cfg, NULL, scan_s, report, &one->offline, err);
+    one->offline.site = site;
+    return offline_open(one->cfg, NULL, scan_s, report, &one->offline, err);
 }
 
 const struct site *heads_site(const struct heads *heads)
@@ -96,7 +96,9 @@ const struct site *heads_site(const struct heads *heads)
 
 int heads_prepare(struct heads *heads, uint32_t station, struct sh_err *err)
 {
-    return offline_prepare(&heads->at->offline, station, heads->report, err);
+    struct site *site = heads->at->offline.site;
+    if (station == 0) station = site->cfg->head.settings.station;
+    return site_open_sights(site, station - 1, 1, heads->report, err);
 }
 
 /* The hash of several streams is that of their hashes, as text, in the order of their heads. */
