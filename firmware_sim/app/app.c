@@ -273,7 +273,7 @@ void app_warn_empty(uint64_t pulses, uint64_t empty, uint64_t faint)
             (unsigned long long)faint);
 }
 
-int app_open_new(const char *path, FILE **out, struct sh_err *err)
+static int open_new(const char *path, FILE **out, struct sh_err *err)
 {
     const int to_stdout = strcmp(path, "-") == 0;
     int fd = -1, rc = to_stdout ? SH_OK : newfile_open(path, &fd, err);
@@ -290,7 +290,7 @@ static const char *name_of(const char *path)
     return strcmp(path, "-") == 0 ? "standard output" : path;
 }
 
-int app_close_new(const char *path, FILE *out, struct sh_err *err)
+static int close_new(const char *path, FILE *out, struct sh_err *err)
 {
     errno = 0;
     int failed = fflush(out) != 0 || ferror(out);
@@ -304,18 +304,27 @@ int app_close_new(const char *path, FILE *out, struct sh_err *err)
     return sh_fail(err, SH_EIO, "%s: %s", name_of(path), why != 0 ? strerror(why) : "writing failed");
 }
 
+int app_write_file(const char *path, void (*put)(FILE *out, const void *ctx), const void *ctx, struct sh_err *err)
+{
+    FILE *out;
+    const int rc = open_new(path, &out, err);
+    if (rc != SH_OK) return rc;
+    put(out, ctx);
+    return close_new(path, out, err);
+}
+
 int app_write_json(const char *path, void (*put)(struct json *json, const void *ctx), const void *ctx,
                    struct sh_err *err)
 {
     struct sh_err why = {0};
     struct json json;
     FILE *out;
-    int rc = app_open_new(path, &out, err);
+    int rc = open_new(path, &out, err);
     if (rc != SH_OK) return rc;
     json_begin(&json, out);
     put(&json, ctx);
     const int ended = json_end(&json, &why);
-    rc = app_close_new(path, out, err);
+    rc = close_new(path, out, err);
     return ended != SH_OK ? sh_fail(err, ended, "%s: %s", name_of(path), why.text) : rc;
 }
 

@@ -105,13 +105,10 @@ int app_is_recording(const char *path);
 /* Prints a warning where fewer than one pulse in twenty has an echo. */
 void app_warn_empty(uint64_t pulses, uint64_t empty, uint64_t faint);
 
-/* Opens the file that a user names for output, empty; "-": standard output. */
-int app_open_new(const char *path, FILE **out, struct sh_err *err);
-/* Closes a file that was written, but not standard output. Returns the first error in writing it; its text begins with
- * the path, or with "standard output". */
-int app_close_new(const char *path, FILE *out, struct sh_err *err);
-
-/* Writes one JSON value, by `put`, to a file; path "-" is standard output. */
+/* Writes the file that a user names for output anew, by `put`; path "-" is standard output, which stays open. Returns
+ * the first error in writing; its text begins with the path, or with "standard output". */
+int app_write_file(const char *path, void (*put)(FILE *out, const void *ctx), const void *ctx, struct sh_err *err);
+/* The same for one JSON value. */
 int app_write_json(const char *path, void (*put)(struct json *json, const void *ctx), const void *ctx,
                    struct sh_err *err);
 

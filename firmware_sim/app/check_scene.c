@@ -229,7 +229,7 @@ int check_print_scene(const struct site *site, unsigned n_warnings, const char *
         print_left_out(&parts, out);
         fprintf(out, "warnings  %u%s\n", n_warnings, n_warnings > 0 ? ", on standard error" : "");
     }
-    if (rc == SH_OK && csv != NULL) rc = csv_file_write(csv, put_csv, &parts, err);
+    if (rc == SH_OK && csv != NULL) rc = app_write_file(csv, put_csv, &parts, err);
     for (uint32_t i = 0; i < parts.n; i++) {
         scene_objects_free(&parts.part[i].objects);
         free(parts.part[i].order);

@@ -106,11 +106,17 @@ static void put_all(struct json *json, const void *ctx)
     json_close_object(json);
 }
 
+static void put_junit(FILE *out, const void *ctx)
+{
+    const struct verdicts_work *work = ctx;
+    verdict_put_junit(work->made, work->n, out);
+}
+
 static int write_files(const struct verdicts_work *work, struct sh_err *err)
 {
     const struct verdicts *v = work->verdicts;
     int rc = v->json != NULL ? app_write_json(v->json, put_all, work, err) : SH_OK;
-    if (rc == SH_OK && v->junit != NULL) rc = verdict_write_junit(v->junit, work->made, work->n, err);
+    if (rc == SH_OK && v->junit != NULL) rc = app_write_file(v->junit, put_junit, work, err);
     return rc;
 }
 

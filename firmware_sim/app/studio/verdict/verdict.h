@@ -98,6 +98,6 @@ uint32_t verdict_count(const struct verdict *verdict, enum verdict_state state);
 void verdict_print(const struct verdict *verdict, FILE *out);
 void verdict_put(const struct verdict *verdict, struct json *json);
 /* JUnit XML: a test suite for each of the n scenarios, and in it a test case for each check. */
-int verdict_write_junit(const char *path, const struct verdict *verdict, uint32_t n, struct sh_err *err);
+void verdict_put_junit(const struct verdict *verdict, uint32_t n, FILE *out);
 
 #endif
