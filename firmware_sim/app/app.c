@@ -328,6 +328,19 @@ int app_write_json(const char *path, void (*put)(struct json *json, const void *
     return ended != SH_OK ? sh_fail(err, ended, "%s: %s", name_of(path), why.text) : rc;
 }
 
+int app_make_folder(const char *what, char *folder, size_t cap, struct sh_err *err)
+{
+    const char *temporary = getenv("TMPDIR");
+    if (temporary == NULL || temporary[0] == '\0') temporary = "/tmp";
+    const size_t n = (size_t)snprintf(folder, cap, "%s/scanhead-%s-XXXXXX", temporary, what);
+    if (n < cap && mkdtemp(folder) != NULL) return SH_OK;
+    const int rc = n < cap ? sh_fail(err, SH_EIO, "%s: %s", folder, strerror(errno))
+                           : sh_fail(err, SH_EIO, "TMPDIR has %zu bytes; allowed are up to %zu: %.100s...",
+                                     strlen(temporary), cap - 1 - (n - strlen(temporary)), temporary);
+    folder[0] = '\0';
+    return rc;
+}
+
 int app_say_ready(long fd, void (*put)(struct json *json, const void *ctx), const void *ctx, struct sh_err *err)
 {
     if (fd == 0) return SH_OK;

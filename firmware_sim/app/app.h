@@ -112,6 +112,9 @@ int app_write_file(const char *path, void (*put)(FILE *out, const void *ctx), co
 int app_write_json(const char *path, void (*put)(struct json *json, const void *ctx), const void *ctx,
                    struct sh_err *err);
 
+/* Makes a folder in TMPDIR, /tmp where that is not set. what: for its name. After an error `folder` is empty. */
+int app_make_folder(const char *what, char *folder, size_t cap, struct sh_err *err);
+
 /* --ready-fd: writes one JSON value, by `put`, as a line to descriptor fd, and closes fd; standard output and standard
  * error stay open. fd 0: the option was not given, and nothing is done. */
 int app_say_ready(long fd, void (*put)(struct json *json, const void *ctx), const void *ctx, struct sh_err *err);

@@ -123,7 +123,6 @@ static int write_files(const struct verdicts_work *work, struct sh_err *err)
 /* The folder that the user names, or a new one. */
 static int make_folder(struct verdicts *v, char *own, size_t cap, struct sh_err *err)
 {
-    const char *temporary = getenv("TMPDIR");
     if (v->options.folder != NULL && strlen(v->options.folder) > VERDICTS_MAX_FOLDER)
         return sh_fail(err, SH_EINPUT, "--client-folder: has %zu characters; allowed are %d", strlen(v->options.folder),
                        VERDICTS_MAX_FOLDER);
@@ -131,9 +130,8 @@ static int make_folder(struct verdicts *v, char *own, size_t cap, struct sh_err 
         if (mkdir(v->options.folder, 0777) == 0 || errno == EEXIST) return SH_OK;
         return sh_fail(err, SH_EINPUT, "--client-folder %s: %s", v->options.folder, strerror(errno));
     }
-    snprintf(own, cap, "%.300s/scanhead-soak-XXXXXX", temporary != NULL && temporary[0] != '\0' ? temporary : "/tmp");
-    v->options.folder = mkdtemp(own);
-    return v->options.folder != NULL ? SH_OK : sh_fail(err, SH_EIO, "%s: %s", own, strerror(errno));
+    v->options.folder = own;
+    return app_make_folder("soak", own, cap, err);
 }
 
 static int say_findings(const struct verdicts_work *work, struct sh_err *err)
