@@ -240,7 +240,7 @@ static void test_a_client_leaves(void **state)
     struct scanhead_frame frame;
     struct scanhead_stats stats;
     snprintf(file, sizeof file, "%s", replay_room(wire, "head.shs", 30));
-    static const char *const more[] = {"--link", "type: tcp, port: 0", "--speed", "10", "--quiet",
+    static const char *const more[] = {"--link", "type: tcp, port: 0",  "--speed", "10", "--quiet",
                                        "--set",  "loop.queue_ms=10000", NULL}; /* on a busy machine, too */
     struct head head = head_start(wire, file, more);
     struct scanhead *first = client_open(head_endpoint(&head, "tcp")),
