@@ -85,18 +85,15 @@ int app_fail_config(const struct config_diagnostics *diagnostics)
     return status;
 }
 
-int app_with_links(const struct app_input *in, const char *links,
-                   int (*work)(struct config *cfg, void *ctx, struct sh_err *err), void *ctx)
+int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, void *ctx, struct sh_err *err),
+                    void *ctx)
 {
     struct sh_err err = {0};
     struct config_diagnostics diagnostics;
     struct config *cfg = calloc(1, sizeof *cfg);
-    if (cfg == NULL) {
-        sh_fail(&err, SH_ENOMEM, "no memory");
-        return app_fail(&err);
-    }
-    int rc = links != NULL ? config_load_links(links, "--link", in->sets.set, in->sets.n, cfg, &diagnostics)
-                           : config_load_all(in->operand[0], in->sets.set, in->sets.n, cfg, &diagnostics);
+    if (cfg == NULL) return app_fail(&(struct sh_err){SH_ENOMEM, "no memory"});
+    int rc = in->links != NULL ? config_load_links(in->links, "--link", in->sets.set, in->sets.n, cfg, &diagnostics)
+                               : config_load_all(in->operand[0], in->sets.set, in->sets.n, cfg, &diagnostics);
     if (rc != SH_OK || (in->scenario != NULL && config_add_scenario(cfg, in->scenario, &diagnostics) != SH_OK)) {
         free(cfg);
         return app_fail_config(&diagnostics);
@@ -105,12 +102,6 @@ int app_with_links(const struct app_input *in, const char *links,
     if (rc == SH_OK) rc = work(cfg, ctx, &err);
     free(cfg);
     return rc == SH_OK ? APP_OK : app_fail(&err);
-}
-
-int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, void *ctx, struct sh_err *err),
-                    void *ctx)
-{
-    return app_with_links(in, NULL, work, ctx);
 }
 
 void app_warn_settings_file(const struct config *cfg, const char *why)
@@ -282,7 +273,7 @@ void app_warn_empty(uint64_t pulses, uint64_t empty, uint64_t faint)
             (unsigned long long)faint);
 }
 
-int app_open_new(const char *path, FILE **out, struct sh_err *err)
+static int open_new(const char *path, FILE **out, struct sh_err *err)
 {
     const int to_stdout = strcmp(path, "-") == 0;
     int fd = -1, rc = to_stdout ? SH_OK : newfile_open(path, &fd, err);
@@ -299,7 +290,7 @@ static const char *name_of(const char *path)
     return strcmp(path, "-") == 0 ? "standard output" : path;
 }
 
-int app_close_new(const char *path, FILE *out, struct sh_err *err)
+static int close_new(const char *path, FILE *out, struct sh_err *err)
 {
     errno = 0;
     int failed = fflush(out) != 0 || ferror(out);
@@ -313,19 +304,41 @@ int app_close_new(const char *path, FILE *out, struct sh_err *err)
     return sh_fail(err, SH_EIO, "%s: %s", name_of(path), why != 0 ? strerror(why) : "writing failed");
 }
 
+int app_write_file(const char *path, void (*put)(FILE *out, const void *ctx), const void *ctx, struct sh_err *err)
+{
+    FILE *out;
+    const int rc = open_new(path, &out, err);
+    if (rc != SH_OK) return rc;
+    put(out, ctx);
+    return close_new(path, out, err);
+}
+
 int app_write_json(const char *path, void (*put)(struct json *json, const void *ctx), const void *ctx,
                    struct sh_err *err)
 {
     struct sh_err why = {0};
     struct json json;
     FILE *out;
-    int rc = app_open_new(path, &out, err);
+    int rc = open_new(path, &out, err);
     if (rc != SH_OK) return rc;
     json_begin(&json, out);
     put(&json, ctx);
     const int ended = json_end(&json, &why);
-    rc = app_close_new(path, out, err);
+    rc = close_new(path, out, err);
     return ended != SH_OK ? sh_fail(err, ended, "%s: %s", name_of(path), why.text) : rc;
+}
+
+int app_make_folder(const char *what, char *folder, size_t cap, struct sh_err *err)
+{
+    const char *temporary = getenv("TMPDIR");
+    if (temporary == NULL || temporary[0] == '\0') temporary = "/tmp";
+    const size_t n = (size_t)snprintf(folder, cap, "%s/scanhead-%s-XXXXXX", temporary, what);
+    if (n < cap && mkdtemp(folder) != NULL) return SH_OK;
+    const int rc = n < cap ? sh_fail(err, SH_EIO, "%s: %s", folder, strerror(errno))
+                           : sh_fail(err, SH_EIO, "TMPDIR has %zu bytes; allowed are up to %zu: %.100s...",
+                                     strlen(temporary), cap - 1 - (n - strlen(temporary)), temporary);
+    folder[0] = '\0';
+    return rc;
 }
 
 int app_say_ready(long fd, void (*put)(struct json *json, const void *ctx), const void *ctx, struct sh_err *err)

@@ -41,15 +41,11 @@ int app_fail(const struct sh_err *err);
 /* The same for the first CONFIG_MAX_DIAGNOSTICS errors of a configuration; a last line counts the others. */
 int app_fail_config(const struct config_diagnostics *diagnostics);
 
-/* Loads the configuration that the first operand names, with settings and scenario, and gives it to `work`. `work` may
+/* Loads the configuration that the first operand names, or in->links, with settings and scenario, and gives it to `work`. `work` may
  * change the configuration, which is freed afterwards. Returns the exit status. The reason of a failure is printed,
  * errors of a configuration as by app_fail_config. */
 int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, void *ctx, struct sh_err *err),
                     void *ctx);
-/* The same for `links`, YAML that --link gives in place of a configuration. NULL: as app_with_config. */
-int app_with_links(const struct app_input *in, const char *links,
-                   int (*work)(struct config *cfg, void *ctx, struct sh_err *err), void *ctx);
-
 /* Takes the results of two pieces of work: `rc` of the first, whose reason is in err, and `more` of the second, whose
  * reason is in `why`. Returns the first failure, with its text in err. If both failed, the second text is printed as a
  * warning, unless it is the same. */
@@ -109,15 +105,15 @@ int app_is_recording(const char *path);
 /* Prints a warning where fewer than one pulse in twenty has an echo. */
 void app_warn_empty(uint64_t pulses, uint64_t empty, uint64_t faint);
 
-/* Opens the file that a user names for output, empty; "-": standard output. */
-int app_open_new(const char *path, FILE **out, struct sh_err *err);
-/* Closes a file that was written, but not standard output. Returns the first error in writing it; its text begins with
- * the path, or with "standard output". */
-int app_close_new(const char *path, FILE *out, struct sh_err *err);
-
-/* Writes one JSON value, by `put`, to a file; path "-" is standard output. */
+/* Writes the file that a user names for output anew, by `put`; path "-" is standard output, which stays open. Returns
+ * the first error in writing; its text begins with the path, or with "standard output". */
+int app_write_file(const char *path, void (*put)(FILE *out, const void *ctx), const void *ctx, struct sh_err *err);
+/* The same for one JSON value. */
 int app_write_json(const char *path, void (*put)(struct json *json, const void *ctx), const void *ctx,
                    struct sh_err *err);
+
+/* Makes a folder in TMPDIR, /tmp where that is not set. what: for its name. After an error `folder` is empty. */
+int app_make_folder(const char *what, char *folder, size_t cap, struct sh_err *err);
 
 /* --ready-fd: writes one JSON value, by `put`, as a line to descriptor fd, and closes fd; standard output and standard
  * error stay open. fd 0: the option was not given, and nothing is done. */

@@ -9,6 +9,7 @@
 #include "core/scene_objects.h"
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/csv_file.h"
+#include "firmware_sim/app/ranking.h"
 
 enum { MAX_ROWS = 50 };
 
@@ -80,16 +81,9 @@ static float clear_of(const struct part *p, uint32_t object)
 
 /* ---- the table */
 
-static double area_of(const struct part *p, uint32_t object)
+static double area_of(const void *objects, uint32_t i)
 {
-    return p->objects.object[object].area_m2;
-}
-
-static int by_area(const void *a, const void *b, void *ctx)
-{
-    const uint32_t x = *(const uint32_t *)a, y = *(const uint32_t *)b;
-    const double of_x = area_of(ctx, x), of_y = area_of(ctx, y);
-    return of_x != of_y ? (of_x < of_y) - (of_x > of_y) : (x > y) - (x < y);
+    return ((const struct scene_objects *)objects)->object[i].area_m2;
 }
 
 static void print_row(const struct part *p, uint32_t object, FILE *out)
@@ -219,12 +213,8 @@ static int check_scene_add_part(struct parts *parts, const struct scene *scene, 
     *p = (struct part){.scene = scene, .is_mover = mover != NULL, .mesh = mover != NULL ? mover->number : 0};
     int rc = scene_objects_find(scene, NULL, &app_report_seconds, &p->objects, err);
     if (rc != SH_OK) return rc;
-    p->order = malloc(((size_t)p->objects.n + 1) * sizeof *p->order);
-    if (p->order == NULL) return sh_fail(err, SH_ENOMEM, "no memory to sort %u objects", p->objects.n);
-    for (uint32_t i = 0; i < p->objects.n; i++)
-        p->order[i] = i;
-    qsort_r(p->order, p->objects.n, sizeof *p->order, by_area, p);
-    return SH_OK;
+    p->order = ranking_make(p->objects.n, area_of, &p->objects);
+    return p->order != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory to sort %u objects", p->objects.n);
 }
 
 int check_print_scene(const struct site *site, unsigned n_warnings, const char *csv, FILE *out, struct sh_err *err)
@@ -239,7 +229,7 @@ int check_print_scene(const struct site *site, unsigned n_warnings, const char *
         print_left_out(&parts, out);
         fprintf(out, "warnings  %u%s\n", n_warnings, n_warnings > 0 ? ", on standard error" : "");
     }
-    if (rc == SH_OK && csv != NULL) rc = csv_file_write(csv, put_csv, &parts, err);
+    if (rc == SH_OK && csv != NULL) rc = app_write_file(csv, put_csv, &parts, err);
     for (uint32_t i = 0; i < parts.n; i++) {
         scene_objects_free(&parts.part[i].objects);
         free(parts.part[i].order);

@@ -4,17 +4,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "firmware_sim/app/app.h"
-
-int csv_file_write(const char *path, void (*put)(FILE *out, const void *ctx), const void *ctx, struct sh_err *err)
-{
-    FILE *out;
-    const int rc = app_open_new(path, &out, err);
-    if (rc != SH_OK) return rc;
-    put(out, ctx);
-    return app_close_new(path, out, err);
-}
-
 void csv_file_put_text(FILE *out, const char *text)
 {
     if (text[strcspn(text, ",\"\r\n")] == '\0') {

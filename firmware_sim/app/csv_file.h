@@ -5,11 +5,7 @@
 
 #include <stdio.h>
 
-#include "core/err.h"
 #include "core/scene.h"
-
-/* Writes a file, by `put`; path "-" is standard output. */
-int csv_file_write(const char *path, void (*put)(FILE *out, const void *ctx), const void *ctx, struct sh_err *err);
 
 /* Writes a text, in quotes where it needs them. */
 void csv_file_put_text(FILE *out, const char *text);

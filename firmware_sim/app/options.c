@@ -83,7 +83,14 @@ int app_find_word(const char *option, const char *word, const char *const *words
         if (strcmp(word, words[i]) == 0) return (int)i;
         snprintf(allowed + strlen(allowed), sizeof allowed - strlen(allowed), "%s%s", i > 0 ? ", " : "", words[i]);
     }
-    return sh_fail(err, SH_EINPUT, "--%s %s: allowed are %s", option, word, allowed);
+    return sh_fail(err, SH_EINPUT, "--%s %s: allowed %s %s", option, word, n == 1 ? "is" : "are", allowed);
+}
+
+static int take_choice(const struct app_command *command, const struct app_option *row, const char *text, int *out)
+{
+    struct sh_err err;
+    *out = app_find_word(row->name, text, row->choices, row->n_choices, &err);
+    return *out >= 0 ? APP_OK : app_usage(command, "%s", err.text);
 }
 
 int app_read_numbers(const char *text, char between, double *out, int n)
@@ -167,6 +174,8 @@ static int apply(const struct app_command *command, const struct app_option *row
         return add_key(&in->sets, row->key, text);
     case APP_SET:
         return app_add_set(&in->sets, text);
+    case APP_CHOICE:
+        return take_choice(command, row, text, at);
     case APP_PASS:
         return pass(row, text, at);
     default:
@@ -406,7 +415,7 @@ static int take_option(const struct app_command *command, int opt, const char *w
     in->alone |= row->kind == APP_ALONE;
     in->n_options++;
     const uint64_t bit = UINT64_C(1) << (row - command->options);
-    if ((row->kind == APP_TEXT || row->kind == APP_PASS) && (in->given & bit) != 0)
+    if ((row->kind == APP_TEXT || row->kind == APP_CHOICE || row->kind == APP_PASS) && (in->given & bit) != 0)
         return app_usage(command, "--%s: given twice; one is allowed", row->name);
     in->given |= bit;
     const struct app_file file = {.option = row->name, .path = optarg, .use = row->file, .is_given = 1};

@@ -30,6 +30,7 @@ enum app_option_kind {
     APP_OUTPUT,    /* sets a long: a descriptor that the program was started with and can write to */
     APP_KEY,       /* stands for a configuration key */
     APP_SET,       /* any configuration key */
+    APP_CHOICE,    /* sets an int, or an enum, to the number of one of `choices`, from 0 */
     APP_CALL,      /* calls apply */
     APP_PASS,      /* adds --NAME, and its value, to a struct app_words */
     APP_ALONE,     /* calls apply; the command then takes no operands */
@@ -124,6 +125,7 @@ struct app_input {
     struct app_file file[APP_MAX_FILES];
     int n_files;
     int opens_links;      /* as the command says */
+    const char *links;    /* YAML that --link gives in place of a configuration; NULL: none */
     const char *scenario; /* a file whose faults are added to those of the configuration; NULL: none */
 };
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "firmware_sim/app/surfaces.h"
 
+#include "firmware_sim/app/app.h"
 #include "firmware_sim/app/csv_file.h"
 
 static void surfaces_put(FILE *out, const void *ctx)
@@ -22,5 +23,5 @@ static void surfaces_put(FILE *out, const void *ctx)
 
 int surfaces_write(const char *path, const struct site *site, struct sh_err *err)
 {
-    return csv_file_write(path, surfaces_put, site, err);
+    return app_write_file(path, surfaces_put, site, err);
 }

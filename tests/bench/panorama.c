@@ -266,7 +266,7 @@ static int run(const struct options *o, struct bench_target *t, struct alone *a,
     if (rc == SH_OK) rc = config_load(config_path, o->set, o->n_sets, cfg, err);
     if (rc == SH_OK) rc = offline_open(cfg, NULL, 0.0, NULL, off, err);
     static struct figures figures;
-    if (rc == SH_OK) rc = offline_prepare(off, 1, NULL, err);
+    if (rc == SH_OK) rc = site_open_sights(off->site, 0, 1, NULL, err);
     if (rc == SH_OK) rc = measure(o, a, off, &figures, err);
     if (rc == SH_OK && o->raw) print_raw(o, &figures);
     if (rc == SH_OK && !o->raw) print_medians(o, a, &figures);

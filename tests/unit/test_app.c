@@ -225,7 +225,7 @@ static void csv_fields_are_quoted_where_they_must_be(void **state)
     static const char *const texts[] = {"", "plain", "a,b", "a\"b", "a\nb", "a\rb", "\"", NULL};
     struct sh_err err;
     output_take(&output, stdout);
-    assert_int_equal(csv_file_write("-", put_texts, texts, &err), SH_OK);
+    assert_int_equal(app_write_file("-", put_texts, texts, &err), SH_OK);
     expect_said("|plain|\"a,b\"|\"a\"\"b\"|\"a\nb\"|\"a\rb\"|\"\"\"\"|");
 }
 

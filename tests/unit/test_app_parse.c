@@ -19,7 +19,10 @@ struct values {
     double number;
     long whole, fd;
     struct app_words words;
+    int choice;
 };
+
+static const char *const WORDS[] = {"one", "two"}, *const SOLE[] = {"sole"};
 
 static int take(void *values, const char *text)
 {
@@ -46,6 +49,8 @@ static const struct app_option OPTIONS[] = {
     {APP_ALONE, "alone", "F", .apply = take, .file = APP_READS},
     {APP_PRINT, "print", NULL, .apply = take},
     {APP_FLAG, "quiet", NULL, .at = AT(quiet)},
+    {APP_CHOICE, "choice", "W", .at = AT(choice), OPTION_CHOICES(WORDS)},
+    {APP_CHOICE, "sole", "W", .at = AT(choice), OPTION_CHOICES(SOLE)},
     OPTION_END
 };
 /* clang-format on */
@@ -111,6 +116,17 @@ static void each_kind_sets_its_value(void **state)
     assert_true(in.alone == 1 && in.operand[0] == NULL && in.n_files == 2);
     assert_int_equal(parse("--print --nothing"), APP_OK); /* what comes after it doesn't count */
     assert_int_equal(v.calls, 1);
+}
+
+static void a_choice_is_one_of_its_words(void **state)
+{
+    (void)state;
+    assert_int_equal(parse("a b --choice two"), APP_GO_ON);
+    assert_int_equal(v.choice, 1);
+    refuses("a b --choice three", "scanhead make: --choice three: allowed are one, two; see scanhead make --help\n");
+    refuses("a b --sole two", "scanhead make: --sole two: allowed is sole; see scanhead make --help\n");
+    refuses("a b --choice one --choice two",
+            "scanhead make: --choice: given twice; one is allowed; see scanhead make --help\n");
 }
 
 static void numbers_keep_their_limits(void **state)
@@ -268,15 +284,11 @@ static void the_nearest_word_is_meant(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(each_kind_sets_its_value),
-        cmocka_unit_test(numbers_keep_their_limits),
-        cmocka_unit_test(a_descriptor_must_be_writable),
-        cmocka_unit_test(keys_are_settings),
-        cmocka_unit_test(lists_have_an_end),
-        cmocka_unit_test(words_are_passed_on),
-        cmocka_unit_test(rows_are_taken_from_another_command),
-        cmocka_unit_test(numbers_in_a_row),
-        cmocka_unit_test(the_nearest_word_is_meant),
+        cmocka_unit_test(each_kind_sets_its_value),  cmocka_unit_test(a_choice_is_one_of_its_words),
+        cmocka_unit_test(numbers_keep_their_limits), cmocka_unit_test(a_descriptor_must_be_writable),
+        cmocka_unit_test(keys_are_settings),         cmocka_unit_test(lists_have_an_end),
+        cmocka_unit_test(words_are_passed_on),       cmocka_unit_test(rows_are_taken_from_another_command),
+        cmocka_unit_test(numbers_in_a_row),          cmocka_unit_test(the_nearest_word_is_meant),
     };
     return cmocka_run_group_tests_name("app_parse", tests, NULL, NULL);
 }

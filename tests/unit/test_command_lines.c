@@ -84,7 +84,7 @@ static const struct lines_row OPERANDS[] = {
     {"--to 2 is not after --from, which is 2; allowed is a larger number", {"run a.shs --from 2 --to 2"}},
     {"--link '': allowed are pty, tcp, ... or keys such as 'type: tcp, port: 5025'", {"run a.shs --link="}},
     {"--link 'a#b': allowed are pty, tcp, ... or keys such as 'type: tcp, port: 5025'", {"run a.shs --link a#b"}},
-    {"--unknown 'silent': allowed are silence, error, close", {"run a.pcap --unknown silent"}},
+    {"--unknown silent: allowed are silence, error, close", {"run a.pcap --unknown silent"}},
 };
 
 /* ---- options that go together */
@@ -102,11 +102,11 @@ static const struct lines_row TOGETHER[] = {
      {"coverage x --grid 1 --at 3,2,1,4"}},
     {"--at 1,2,3,4,6,5: allowed is X0,Y0,X1,Y1 or X0,Y0,X1,Y1,Z0,Z1 in metres, the lower number of each pair first",
      {"coverage x --grid 1 --at 1,2,3,4,6,5"}},
-    {"--by material is not known; allowed label", {"coverage x --by material"}},
+    {"--by material: allowed is label", {"coverage x --by material"}},
     {"--colour: allowed with -o FILE", {"coverage x --colour seen"}},
     {"-o a.las: the file is a mesh; allowed is a name that ends in .ply, .obj, .gltf, .glb or .fbx",
      {"coverage x -o a.las"}},
-    {"--colour red is not known; allowed seen, count, density, incidence", {"coverage x -o a.ply --colour red"}},
+    {"--colour red: allowed are seen, count, density, incidence", {"coverage x -o a.ply --colour red"}},
     {"--output: given twice; one is allowed", {"map x -o a.png -o b.png"}},
     {"-o FILE.png or -o FILE.svg is needed", {"map x"}},
     {"-o a.jpg: allowed are names that end in .png or .svg", {"map x -o a.jpg"}},
@@ -162,7 +162,9 @@ static const struct lines_row TOGETHER[] = {
     {"--client-file, --client-folder, --client-grace, --reconnect-limit, --match-mm, --allow and --junit need --client",
      {"soak x --client-file f", "soak x --client-folder f", "soak x --junit f", "soak x --reconnect-limit 1",
       "soak x --client-grace 1", "soak x --match-mm 0", "soak x --allow connects"}},
-    {"--allow nothing: there is no such check; allowed are those of --help", {"soak x --allow nothing"}},
+    {"--allow nothing: allowed are connects, comes-back, lets-go, asks-right, scans, keeps-up, lives, ends, points-read, "
+     "points-known, points-once",
+     {"soak x --allow nothing"}},
     {"several --scenario need --client", {"soak x --scenario a --scenario b"}},
     {"--truth is one file, and 2 scenarios are given; allowed is one",
      {"soak x --client c --scenario a --scenario b --truth t"}},

@@ -242,8 +242,8 @@ static void the_stream_is_that_of_a_socket(void **state)
         if (i % 2 == 0) scan_through_socket(i / 2, &wanted);
         assert_true(wanted.pulses > 1000);
         struct rig *rig = open_rig(i / 2);
-        struct offline off = {0};
-        need(offline_open_at(rig->site, 0.0, NULL, &off, &err), &err);
+        struct offline off = {.site = rig->site};
+        need(offline_open(NULL, NULL, 0.0, NULL, &off, &err), &err);
         scan(off.sh, i % 2, &seen);
         assert_int_equal(seen.pulses, wanted.pulses);
         assert_string_equal(seen.sha256, wanted.sha256);
@@ -257,12 +257,12 @@ static void a_client_may_go_within_a_scan(void **state)
 {
     (void)state;
     struct rig *rig = open_rig(1);
-    struct offline off = {0};
+    struct offline off = {.site = rig->site};
     struct scanhead_frame frame = {0};
     struct scanhead_stats before, after;
     struct sh_err err;
     char reply[64];
-    need(offline_open_at(rig->site, 0.0, NULL, &off, &err), &err);
+    need(offline_open(NULL, NULL, 0.0, NULL, &off, &err), &err);
     wait_idle(off.sh);
     ask(off.sh, "SCAN:STAR", "OK");
     while (frame.type != SCANHEAD_POINTS)
@@ -284,12 +284,12 @@ static void a_head_may_end_within_a_scan(void **state)
 {
     (void)state;
     struct rig *rig = open_rig(1);
-    struct offline off = {0};
+    struct offline off = {.site = rig->site};
     struct scanhead_frame frame = {0};
     struct scanhead_stats stats;
     struct sh_err err;
     int rc;
-    need(offline_open_at(rig->site, 0.0, NULL, &off, &err), &err);
+    need(offline_open(NULL, NULL, 0.0, NULL, &off, &err), &err);
     wait_idle(off.sh);
     ask(off.sh, "SCAN:STAR", "OK");
     loop_end(off.loop);
@@ -362,11 +362,11 @@ static void a_lent_tick_stays_while_its_client_reads(void **state)
         "loop.pace=fast",  "head.frames=1",     "loop.queue_ms=2650",    "loop.ahead_ms=5",      "loop.tick_hz=100",
         "head.lines_hz=1", "head.pan_deg_s=10", "head.line_start_deg=0", "head.line_stop_deg=4", "head.prr_hz=1000000"};
     struct rig *rig = rig_open(NULL, sets, sizeof sets / sizeof *sets);
-    struct offline off = {0};
+    struct offline off = {.site = rig->site};
     struct scanhead_frame frame;
     struct sh_err err;
     uint64_t pulses = 0;
-    need(offline_open_at(rig->site, 0.0, NULL, &off, &err), &err);
+    need(offline_open(NULL, NULL, 0.0, NULL, &off, &err), &err);
     wait_idle(off.sh);
     ask(off.sh, "SCAN:STAR", "OK");
     assert_int_equal(off.loop->stream.ring.n_slots, 300);

@@ -116,8 +116,28 @@ static void options(void **state)
     assert_string_equal(got.stats, "j");
     assert_true(got.send[0].len == 3 && memcmp(sent[0], "ab\n", 3) == 0);
     assert_true(got.send[1].len == 3 && memcmp(sent[1], "A\0\\", 3) == 0);
-    assert_int_equal(record_words("tcp:a:5", (const char *const[]){"--relay", "127.0.0.1:0", NULL}), APP_OK);
-    assert_string_equal(got.relay, "127.0.0.1:0");
+}
+
+static void where_clients_come(void **state)
+{
+    static const struct {
+        const char *relay, *host; /* NULL: it is refused */
+        int port;
+    } rows[] = {{"9000", "", 9000},     {"0", "", 0},   {"65535", "", 65535}, {"127.0.0.2:1", "127.0.0.2", 1},
+                {"[::1]:1", "::1", 1},  {":1", "", 1},  {"65536", NULL, 0},   {"-1", NULL, 0},
+                {"", NULL, 0},          {"a", NULL, 0}, {"1a", NULL, 0},      {"1,2", NULL, 0},
+                {"127.0.0.1:", NULL, 0}};
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        const int is_right = rows[i].host != NULL;
+        assert_int_equal(record_words("tcp:a:5", (const char *const[]){"--relay", rows[i].relay, NULL}),
+                         is_right ? APP_OK : APP_USAGE);
+        assert_int_equal(n_runs, is_right);
+        if (!is_right) continue;
+        assert_string_equal(got.relay, rows[i].relay);
+        assert_string_equal(got.clients.host, rows[i].host);
+        assert_int_equal(got.clients.port[0], rows[i].port);
+    }
 }
 
 static void exit_statuses(void **state)
@@ -161,11 +181,9 @@ static void who_wants_raw_data(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(places),
-        cmocka_unit_test(limits),
-        cmocka_unit_test(options),
-        cmocka_unit_test(exit_statuses),
-        cmocka_unit_test(who_wants_raw_data),
+        cmocka_unit_test(places),        cmocka_unit_test(limits),
+        cmocka_unit_test(options),       cmocka_unit_test(where_clients_come),
+        cmocka_unit_test(exit_statuses), cmocka_unit_test(who_wants_raw_data),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

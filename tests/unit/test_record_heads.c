@@ -100,35 +100,24 @@ void site_free(struct site *site)
         say("free:%d ", (int)(site - site_of));
 }
 
-static int open_it(const char *what, int k, double scan_s, struct offline *off, struct sh_err *err)
-{
-    assert_true(scan_s == 2.5 && k == of_offline(off));
-    off->site = &site_of[k];
-    off->sh = handle_of(k);
-    return call(err, "%s:%d", what, k);
-}
-
 int offline_open(struct config *of, const struct site *beside, double scan_s, const struct sh_report *report,
                  struct offline *off, struct sh_err *err)
 {
+    const int k = of_cfg(of);
     if (beside == NULL)
         assert_ptr_equal(report, heads->report);
     else
         assert_true(beside == &site_of[0] && report->progress != NULL);
-    return open_it(beside == NULL ? "open" : "beside", of_cfg(of), scan_s, off, err);
+    assert_true(scan_s == 2.5 && k == of_offline(off));
+    off->site = &site_of[k];
+    off->sh = handle_of(k);
+    return call(err, "%s:%d", beside == NULL ? "open" : "beside", k);
 }
 
-int offline_open_at(struct site *site, double scan_s, const struct sh_report *report, struct offline *off,
-                    struct sh_err *err)
+int site_open_sights(struct site *site, uint32_t first, uint32_t n, const struct sh_report *report, struct sh_err *err)
 {
-    assert_ptr_equal(report, heads->report);
-    return open_it("open_at", (int)(site - site_of), scan_s, off, err);
-}
-
-int offline_prepare(struct offline *off, uint32_t station, const struct sh_report *report, struct sh_err *err)
-{
-    assert_ptr_equal(report, heads->report);
-    return call(err, "prepare:%d:%u", of_offline(off), station);
+    assert_true(n == 1 && report == heads->report);
+    return call(err, "prepare:%d:%u", (int)(site - site_of), first);
 }
 
 void offline_stop(struct offline *off)
@@ -244,7 +233,8 @@ static void each_scanner_has_a_head(void **state)
     assert_ptr_equal(heads_site(heads), &site_of[0]);
     struct sh_err err;
     assert_int_equal(heads_prepare(heads, 3, &err), SH_OK);
-    assert_string_equal(trace, "prepare:0:3 ");
+    assert_int_equal(heads_prepare(heads, 0, &err), SH_OK); /* where it stands at power-up */
+    assert_string_equal(trace, "prepare:0:2 prepare:0:3 ");
     end();
 }
 

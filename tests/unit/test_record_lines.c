@@ -136,6 +136,8 @@ static const struct lines_row RAW[] = {
      {"record --raw tcp:a:1,2 -o a.pcapng"}},
     {"udp:a:1: --send and --relay need tcp:HOST:PORT",
      {"record --raw udp:a:1 -o a.pcapng --relay 1", "record --raw udp:a:1 -o a.pcapng --send x"}},
+    {"--relay a: allowed is PORT or ADDRESS:PORT, with a port from 0 (the system's choice) to 65535",
+     {"record --raw tcp:a:1 -o a.pcapng --relay a"}},
     {"--send and --relay: with --relay only the client sends; allowed is one of them",
      {"record --raw tcp:a:1 -o a.pcapng --send x --relay 1"}},
     {"--send \\q: allowed after a backslash: n, r, t, 0, \\, \", ', or x and two hexadecimal digits",

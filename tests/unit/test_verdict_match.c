@@ -42,9 +42,9 @@ static void begin(void)
     watch.n_span = 1;
 }
 
-static struct match try(const struct cloud *cloud, double match_m)
+static struct verdict_points try(const struct cloud *cloud, double match_m)
 {
-    struct match match;
+    struct verdict_points match;
     struct sh_err err;
     const struct match_input in = {
         .stream = &stream, .watch = &watch, .tick_ns = TICK_NS, .cloud = cloud, .match_m = match_m};
@@ -65,7 +65,7 @@ static void test_a_right_client(void **state)
     (void)state;
     begin();
     const struct cloud cloud = cloud_of(0, N);
-    const struct match m = try(&cloud, 1e-5);
+    const struct verdict_points m = try(&cloud, 1e-5);
     assert_int_equal(m.n, N);
     assert_int_equal(m.unknown + m.repeated + m.again + m.empty, 0);
     assert_int_equal(m.sent, N);
@@ -80,7 +80,7 @@ static void test_unknown_and_empty(void **state)
     theirs[7][2] += 0.0001;
     theirs[300][0] = NAN;
     memset(theirs[301], 0, sizeof theirs[301]);
-    const struct match m = try(&cloud, 1e-5);
+    const struct verdict_points m = try(&cloud, 1e-5);
     assert_int_equal(m.unknown, 1);
     assert_int_equal(m.first_unknown, 7);
     assert_int_equal(m.empty, 2);
@@ -125,7 +125,7 @@ static void test_dense_points(void **state)
         theirs[N - 1 - i][0] = 1e-3 * floor(xyz[i][0] / 1e-3 + 0.5);
     for (int i = 0; i < N; i++)
         theirs[i][1] = theirs[i][2] = 0.5;
-    struct match m = try(&cloud, 5.1e-4);
+    struct verdict_points m = try(&cloud, 5.1e-4);
     assert_int_equal(m.unknown + m.repeated, 0);
     memcpy(theirs + N, theirs, sizeof xyz); /* all of it twice */
     cloud.n = 2 * N;
@@ -145,7 +145,7 @@ static void test_frames(void **state)
         theirs[i][1] = -x;
         theirs[i][2] = xyz[i][2] - 1.5;
     }
-    struct match m = try(&cloud, 1e-5);
+    struct verdict_points m = try(&cloud, 1e-5);
     assert_string_equal(m.frame, "head");
     assert_int_equal(m.unknown, 0);
     for (int i = 0; i < N; i++) { /* forward is y, left is -x */
@@ -178,7 +178,7 @@ static void test_most_points_decide(void **state)
     theirs[N][1] = -2.0 - xyz[7][1];
     theirs[N][2] = xyz[7][2] - 1.5;
     cloud.n++;
-    const struct match m = try(&cloud, 1e-5);
+    const struct verdict_points m = try(&cloud, 1e-5);
     assert_string_equal(m.frame, "scene");
     assert_int_equal(m.unknown, 1);
     assert_int_equal(m.first_unknown, N);
@@ -214,7 +214,7 @@ static void test_frames_that_are_not_tried(void **state)
         stream.info.crs = rows[i].crs;
         stream.is_moved = rows[i].is_moved;
         const struct cloud cloud = cloud_of(0, N);
-        struct match m = try(&cloud, 1e-5);
+        struct verdict_points m = try(&cloud, 1e-5);
         assert_string_equal(m.frame, rows[i].frame);
         assert_int_equal(m.unknown, 0);
         turn_to_head();
@@ -280,7 +280,7 @@ static void test_a_huge_coordinate(void **state)
         theirs[7][1] = 1e30;
         theirs[8][1] += 0.01; /* more than a millimetre, and 1e-5 m */
         cloud.count_m = 1.2e23;
-        const struct match m = try(&cloud, 1e-5);
+        const struct verdict_points m = try(&cloud, 1e-5);
         assert_int_equal(m.unknown, 2);
         assert_int_equal(m.first_unknown, 7);
         /* Points have three decimals, and are at most 10.01 m from 0 in each direction. */
@@ -295,7 +295,7 @@ static void test_exact_points(void **state)
     begin();
     const struct cloud cloud = cloud_of(0, N);
     theirs[7][2] += 1e-7;
-    struct match m = try(&cloud, 0.0);
+    struct verdict_points m = try(&cloud, 0.0);
     assert_int_equal(m.unknown, 1);
     assert_int_equal(m.repeated, 0);
     stream.n = stream.n_frames = 0; /* a head that saw nothing */
@@ -317,7 +317,7 @@ static void test_a_stop(void **state)
     const struct sh_report report = {.stop = always};
     const struct match_input in = {
         .stream = &stream, .watch = &watch, .tick_ns = TICK_NS, .cloud = &cloud, .match_m = 100.0, .report = &report};
-    struct match match;
+    struct verdict_points match;
     struct sh_err err;
     assert_int_equal(match_points(&in, &match, &err), SH_ESTOPPED);
 }

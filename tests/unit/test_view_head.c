@@ -57,11 +57,10 @@ static void each_key_of_a_turned_recording(void **state)
     struct viewed_surface surface[2] = {{3, (char *)"wall", (char *)"lime"}, {4, (char *)"floor", (char *)""}};
     struct viewed v = {.path = "folder/some.shs",
                        .format = "shs",
-                       .points = {.n = 2, .echo = echo, .label = label},
+                       .points = {.n = 2, .echo = echo, .label = label, .epsg = 4978},
                        .n_empty = 21,
                        .n_left_out = 22,
                        .complete = 1,
-                       .epsg = 4978,
                        .turned = 1,
                        .lat_deg = 52.5,
                        .lon_deg = 13.25,
@@ -120,7 +119,7 @@ static void frames_and_unknown_heads(void **state)
     for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
         char frame[128];
         struct viewed v = {
-            .path = "a.ply", .format = "ply", .epsg = row[i].epsg, .idn = "Maker,,7", .why_no_mesh = "no rows"};
+            .path = "a.ply", .format = "ply", .points.epsg = row[i].epsg, .idn = "Maker,,7", .why_no_mesh = "no rows"};
         snprintf(frame, sizeof frame, "{\"recording\":{\"file\":\"a.ply\",\"format\":\"ply\",\"frame\":%s,",
                  row[i].frame);
         expect_in_order(

@@ -68,19 +68,19 @@ static int fill(void **state)
 static int drop(void **state)
 {
     (void)state;
-    viewed_points_free(&v.points);
+    cloud_free(&v.points);
     return 0;
 }
 
-static struct viewed_points spread(struct view_spread wish)
+static struct cloud spread(struct view_spread wish)
 {
-    struct viewed_points out;
+    struct cloud out;
     if (view_spread(&v, &wish, NULL, &out, &err) != SH_OK) fail_msg("%s", err.text);
     return out;
 }
 
 /* Floats round a range of 52 m by 4e-6 m. */
-static void expect_on_mesh(const struct viewed_points *p, uint32_t i, int is_square)
+static void expect_on_mesh(const struct cloud *p, uint32_t i, int is_square)
 {
     const double *at = p->xyz_m[i], z = is_square ? 1 : 5;
     assert_true(fabs(at[2] - z) < 1e-12 && at[0] >= 0 && at[1] >= 0);
@@ -94,7 +94,7 @@ static void expect_on_mesh(const struct viewed_points *p, uint32_t i, int is_squ
 static void points_have_the_figures_of_their_mesh(void **state)
 {
     (void)state;
-    struct viewed_points p = spread((struct view_spread){.per_m2 = 100, .seed = 1});
+    struct cloud p = spread((struct view_spread){.per_m2 = 100, .seed = 1});
     assert_int_equal(p.n, 450); /* 4 m2, then half a square metre */
     double halves = 0;
     for (uint32_t i = 0; i < p.n; i++) {
@@ -102,14 +102,14 @@ static void points_have_the_figures_of_their_mesh(void **state)
         halves += i < 400 && p.xyz_m[i][1] > p.xyz_m[i][0];
     }
     assert_true(halves > 140 && halves < 260); /* 200 on each triangle, give or take 6 sqrt(400) / 2 */
-    assert_true(p.amplitude_db == NULL && p.t_s == NULL && p.echo == NULL && p.echoes == NULL);
-    viewed_points_free(&p);
+    assert_true(p.amplitude_db == NULL && p.time_s == NULL && p.echo == NULL && p.echo_count == NULL);
+    cloud_free(&p);
     /* A recording without colours has none here. */
     uint8_t(*rgb)[3] = v.points.rgb;
     v.points.rgb = NULL;
     p = spread((struct view_spread){.per_m2 = 100, .seed = 1});
     assert_true(p.n == 450 && p.rgb == NULL);
-    viewed_points_free(&p);
+    cloud_free(&p);
     v.points.rgb = rgb;
 }
 
@@ -123,12 +123,12 @@ static void some_meshes_and_triangles(void **state)
     } rows[] = {{0, 1, 400}, {0, 2, 50}, {1, 0, 250}, {1.5, 1, 200}, {2, 1, 400}, {0.5, 0, 0}};
     (void)state;
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
-        struct viewed_points p = spread(
+        struct cloud p = spread(
             (struct view_spread){.per_m2 = 100, .seed = 7, .long_edge = rows[i].long_edge, .scan = rows[i].scan});
-        if (p.n != rows[i].n) fail_msg("case %zu: %u points", i, p.n);
+        if (p.n != rows[i].n) fail_msg("case %zu: %zu points", i, p.n);
         for (uint32_t k = 0; k < p.n && rows[i].long_edge > 0 && rows[i].long_edge < 2; k++)
             if (p.xyz_m[k][2] == 1) assert_true(p.xyz_m[k][1] >= p.xyz_m[k][0]); /* of the second triangle alone */
-        viewed_points_free(&p);
+        cloud_free(&p);
     }
 }
 

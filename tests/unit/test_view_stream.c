@@ -86,7 +86,7 @@ static void each_point_has_its_columns(void **state)
                 {4, 0, -2, 0, 0.002, 7, 1, 1},  {0, 1, -2, -1, 0.010, 8, 1, 1},   {3, 1, -2, -2, 0.011, 8, 1, 1},
                 {4, 1, -2, -3, 0.012, 8, 1, 1}};
     enum { N = sizeof rows / sizeof rows[0] };
-    const struct viewed_points *p = &shown.points;
+    const struct cloud *p = &shown.points;
     (void)state;
     begin_geo(NATIVE_CRS_LOCAL, 0, 3);
     write_two_lines();
@@ -97,12 +97,12 @@ static void each_point_has_its_columns(void **state)
         near(p->xyz_m[i][1] - 5e6, rows[i].y);
         near(p->xyz_m[i][2] - 400.125, rows[i].z);
         near((double)p->reflectance_db[i], rows[i].db);
-        near(p->t_s[i], rows[i].t_s);
+        near(p->time_s[i], rows[i].t_s);
         assert_true(p->label[i] == rows[i].label && p->station[i] == 3);
-        assert_true(p->echo[i] == rows[i].echo && p->echoes[i] == rows[i].echoes);
+        assert_true(p->echo[i] == rows[i].echo && p->echo_count[i] == rows[i].echoes);
     }
     assert_true(p->range_m != NULL && p->amplitude_db == NULL && p->rgb == NULL);
-    assert_true(shown.n_empty == 1 && shown.n_left_out == 0 && shown.turned == 0 && shown.epsg == 0);
+    assert_true(shown.n_empty == 1 && shown.n_left_out == 0 && shown.turned == 0 && shown.points.epsg == 0);
     assert_string_equal(shown.format, "shs");
     assert_string_equal(shown.idn, "Maker,<Model> & Co,SN1,1.0");
     assert_string_equal(shown.profile, "model");
@@ -260,7 +260,7 @@ static void degrees_are_turned_to_metres(void **state)
         rig_points(0, 0, 0, line, 3);
         loads();
         const double(*xyz_m)[3] = (const double(*)[3])shown.points.xyz_m;
-        assert_true(shown.turned == 1 && shown.epsg == 4979 && shown.n_meshes == 0);
+        assert_true(shown.turned == 1 && shown.points.epsg == 4979 && shown.n_meshes == 0);
         assert_string_equal(shown.why_no_mesh, "a mesh needs metres, and this recording's coordinates are degrees");
         near(shown.lat_deg, 45.0);
         near(shown.lon_deg, 9.0);
@@ -295,7 +295,7 @@ static void ecef_is_turned_to_metres(void **state)
     rig_anchor(&anchor);
     rig_points(0, 0, 0, line, 2);
     loads();
-    assert_true(shown.turned == 1 && shown.points.n == 2 && shown.epsg == 4978);
+    assert_true(shown.turned == 1 && shown.points.n == 2 && shown.points.epsg == 4978);
     assert_true(fabs(shown.lat_deg) < 1e-9 && fabs(shown.lon_deg) < 1e-9 && fabs(shown.height_m) < 1e-6);
     for (int k = 0; k < 3; k++)
         assert_true(fabs(shown.points.xyz_m[1][k] - (const double[]){2.0, 3.0, 1.0}[k]) < 1e-6);

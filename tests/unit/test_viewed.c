@@ -79,9 +79,9 @@ static void a_ply_with_all_columns(void **state)
     assert_string_equal(v.format, "ply");
     assert_int_equal(v.points.n, 2);
     assert_int_equal(v.n_empty, 1);
-    assert_int_equal(v.epsg, 0);
+    assert_int_equal(v.points.epsg, 0);
     assert_int_equal(v.points.echo[1], 2);
-    assert_int_equal(v.points.label[1], VIEWED_LABEL_NONE);
+    assert_int_equal(v.points.label[1], CLOUD_LABEL_NONE);
     assert_int_equal(v.points.rgb[1][2], 3);
     assert_true(v.points.xyz_m[1][2] == -1);
     assert_null(viewed_array(&v.points, VIEWED_REFLECTANCE, &size));
@@ -153,7 +153,7 @@ static void wrong_files_are_refused(void **state)
 enum { N = 5 };
 
 /* Five points are on a line, of stations 1 to 5; the clock begins at 100 s. */
-static void fill(struct viewed_points *p)
+static void fill(struct cloud *p)
 {
     memset(p, 0, sizeof *p);
     assert_int_equal(viewed_points_room(p, N, 1u << VIEWED_T | 1u << VIEWED_STATION | 1u << VIEWED_RGB, &err), SH_OK);
@@ -162,7 +162,7 @@ static void fill(struct viewed_points *p)
         p->xyz_m[i][0] = 500000 + i;
         p->xyz_m[i][1] = 5e6;
         p->xyz_m[i][2] = -i;
-        p->t_s[i] = 100 + 0.25 * i;
+        p->time_s[i] = 100 + 0.25 * i;
         p->station[i] = (uint16_t)(i + 1);
         memset(p->rgb[i], 10 * i, 3);
     }
@@ -171,7 +171,7 @@ static void fill(struct viewed_points *p)
 static void points_as_bytes(void **state)
 {
     const double origin_m[3] = {500001, 5e6, -1};
-    struct viewed_points p;
+    struct cloud p;
     struct web_body b;
     (void)state;
     fill(&p);
@@ -208,7 +208,7 @@ static void points_as_bytes(void **state)
     assert_int_equal(le_get32(b.bytes + 8), 0);
     assert_int_equal(b.len, 184);
     free(b.bytes);
-    viewed_points_free(&p);
+    cloud_free(&p);
 }
 
 static void triangles_as_bytes(void **state)

@@ -306,7 +306,7 @@ void checks_no_points(struct verdict *of, enum verdict_state state, const char *
     say("%s:%s ", of == &verdict && state == VERDICT_FOUND ? "found" : "not_judged", why);
 }
 
-void checks_points(struct verdict *of, const struct match *match, const double unknown[3])
+void checks_points(struct verdict *of, const struct verdict_points *match, const double unknown[3])
 {
     say(of == &verdict && match->n == n_matched && unknown == xyz_m[first_unknown] ? "points " : "POINTS ");
 }
@@ -324,12 +324,12 @@ void cloud_free(struct cloud *cloud)
     say(cloud->xyz_m == xyz_m ? "free_cloud " : "CLOUD ");
 }
 
-int match_points(const struct match_input *in, struct match *match, struct sh_err *err)
+int match_points(const struct match_input *in, struct verdict_points *match, struct sh_err *err)
 {
     if (in->stream != stream || in->watch != watch || in->tick_ns != 5 * MS || in->cloud->n != 9) say("MATCH ");
     if (in->report != &app_report_stderr) say("REPORT ");
     match_m = in->match_m;
-    *match = (struct match){.n = n_matched, .first_unknown = first_unknown};
+    *match = (struct verdict_points){.n = n_matched, .first_unknown = first_unknown};
     return call(err, "match");
 }
 

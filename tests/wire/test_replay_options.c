@@ -53,7 +53,7 @@ static void test_wrong_options(void **state)
     const char *const backward[] = {"run", file, "--start", "--quiet", "--from", "0.002", "--to", "0.001", NULL};
     assert_int_equal(replay_call(wire, backward), 2);
     replay_said(wire, "is not after --from");
-    static const char *const captures[][2] = {{"--unknown", "x"}, {"--device-port", "5"}};
+    static const char *const captures[][2] = {{"--unknown", "close"}, {"--device-port", "5"}};
     for (size_t i = 0; i < sizeof captures / sizeof *captures; i++) {
         const char *const args[] = {"run", file, "--start", "--pace", "fast", captures[i][0], captures[i][1], NULL};
         assert_int_equal(replay_call(wire, args), 2);

@@ -295,7 +295,7 @@ static void test_wrong_usage(void **state)
         {{"--junit", "x"}, "need --client"},
         {{"--reconnect-limit", "3"}, "need --client"},
         {{"--scenario", "a", "--scenario", "b"}, "need --client"},
-        {{"--client", "true", "--allow", "speed"}, "no such check"},
+        {{"--client", "true", "--allow", "speed"}, "--allow speed: allowed are connects"},
         {{"--client", "true", "--pace", "fast"}, "allowed is realtime"},
         {{"--client", "true", "--link", "2"}, "allowed 1 to 1"},
         {{"--client", "true", "--set", "links=[]"}, "links: there are none; needed is one"},

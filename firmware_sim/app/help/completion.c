@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "firmware_sim/app/help/help.h"
-#include "firmware_sim/config/config.h"
 #include "firmware_sim/config/reference.h"
 
 /* This part does not depend on the tables. bash takes words apart at '=', so KEY=VALUE comes as three. _scanhead_value

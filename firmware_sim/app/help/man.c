@@ -4,7 +4,6 @@
 
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/help/help.h"
-#include "firmware_sim/config/config.h"
 #include "firmware_sim/config/reference.h"
 
 enum { NAME_MAX_LEN = 64 };

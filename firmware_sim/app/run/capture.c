@@ -182,19 +182,6 @@ static int serve(struct config *cfg, void *ctx, struct sh_err *err)
     return rc;
 }
 
-static int check_options(struct run_options *o)
-{
-    static const char *const words[] = {[TALK_SILENCE] = "silence", [TALK_ERROR] = "error", [TALK_CLOSE] = "close"};
-    o->replay.talk_options.loop = o->replay.loop;
-    if (o->unknown == NULL) return APP_GO_ON;
-    for (int i = 0; i <= TALK_CLOSE; i++)
-        if (strcmp(o->unknown, words[i]) == 0) {
-            o->replay.talk_options.unknown = (enum talk_unknown)i;
-            return APP_GO_ON;
-        }
-    return app_usage(&app_run, "--unknown '%.40s': allowed are silence, error, close", o->unknown);
-}
-
 /* Serves with the links of --link, or with one for each port. */
 static int with_links(struct capture_run *run)
 {
@@ -206,17 +193,17 @@ static int with_links(struct capture_run *run)
     else
         default_links(run, links, sizeof links);
     snprintf(text, sizeof text, "links:%s%s", links[0] != '\0' ? "\n" : " []", links);
-    return app_with_links(&o->in, text, serve, run);
+    o->in.links = text;
+    return app_with_config(&o->in, serve, run);
 }
 
 int run_capture(struct run_options *o)
 {
     struct capture_run run = {.o = o};
     struct sh_err err = {0};
-    int status = check_options(o);
-    if (status != APP_GO_ON) return status;
+    o->replay.talk_options.loop = o->replay.loop;
     if (capture_load(o->in.operand[0], &app_report_stderr, &run.capture, &err) != SH_OK) return app_fail(&err);
-    status = with_links(&run);
+    const int status = with_links(&run);
     capture_free(run.capture);
     return status;
 }

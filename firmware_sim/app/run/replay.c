@@ -138,11 +138,11 @@ static int replay(struct config *cfg, void *ctx, struct sh_err *err)
 int run_replay(struct run_options *o)
 {
     char text[sizeof o->links + 16];
-    if (o->config != NULL) {
-        struct app_input in = o->in;
-        in.operand[0] = o->config;
-        return app_with_config(&in, replay, o);
-    }
+    struct app_input in = o->in;
     snprintf(text, sizeof text, "links:\n%s", o->links);
-    return app_with_links(&o->in, o->links[0] != '\0' ? text : DEFAULT_LINKS, replay, o);
+    if (o->config != NULL)
+        in.operand[0] = o->config;
+    else
+        in.links = o->links[0] != '\0' ? text : DEFAULT_LINKS;
+    return app_with_config(&in, replay, o);
 }

@@ -187,6 +187,8 @@ static int run_run(int argc, char **argv)
     return kind == RUN_RECORDING ? run_replay(&o) : app_with_config(&o.in, run_head, &o);
 }
 
+static const char *const UNKNOWN[] = {[TALK_SILENCE] = "silence", [TALK_ERROR] = "error", [TALK_CLOSE] = "close"};
+
 #define AT(member) offsetof(struct run_options, member)
 
 /* clang-format off */
@@ -236,7 +238,7 @@ static const struct app_option OPTIONS[] = {
      .help = "serve a recording on this link: pty, tcp, usb, web, file or null; or keys as in a configuration, such "
              "as 'type: tcp, port: 5025'; may be repeated (default: pty and tcp). A capture has links of tcp, pty and "
              "udp, such as 'type: udp, port: 2368' (default: one for each port of its devices)"},
-    {APP_TEXT, "unknown", "WORD", .at = AT(unknown),
+    {APP_CHOICE, "unknown", "WORD", .at = AT(replay.talk_options.unknown), OPTION_CHOICES(UNKNOWN),
      .help = "what a capture does with a request that is not in it: silence (default), error (the protocol's own, of CoLa "
              "and SCIP), close"},
     {APP_WHOLE, "device-port", "N", .min = 1, .max = 65535, .at = AT(device_port),

@@ -20,8 +20,7 @@ struct run_options {
     const char *surfaces; /* --surfaces */
     long ready_fd;
     int quiet, no_hash, frames_given, view;
-    const char *unknown; /* --unknown */
-    long device_port;    /* 0: not given */
+    long device_port; /* 0: not given */
 };
 
 /* serve.c: runs the loop from its start to its end, writes the statistics, and warns of losses. */

@@ -17,13 +17,15 @@
 static const char *const COLOURS[] = {[COVERAGE_SEEN] = "seen",
                                       [COVERAGE_COUNT] = "count",
                                       [COVERAGE_DENSITY] = "density",
-                                      [COVERAGE_INCIDENCE] = "incidence"};
+                                      [COVERAGE_INCIDENCE] = "incidence"},
+                         *const BY[] = {"label"};
 
 struct coverage_run {
     struct app_input in;
-    const char *output, *colour_name, *by, *at;
+    const char *output, *at;
     struct coverage_next_options o;
     int json, quiet, written;
+    int by; /* number of a word of BY; negative: not given */
     enum coverage_colour colour;
     const struct config *cfg;
     struct sh_report report;
@@ -99,7 +101,7 @@ static int sum_up(struct coverage_run *r, struct sh_err *err)
     for (uint32_t i = 0; i < n; i++)
         result->station[i].alone_m2 = alone_m2[i];
     free(alone_m2);
-    if (r->by != NULL) {
+    if (r->by >= 0) {
         result->label = calloc(r->site->scene->n_surfaces, sizeof *result->label);
         if (result->label == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the figures of labels");
         coverage_by_label(r->coverage, result->label);
@@ -196,17 +198,6 @@ static int cover(struct config *cfg, void *ctx, struct sh_err *err)
 static const double HEIGHT_M = 1.6, STEP_DEG = 1.0;
 enum { SCANS = 3 };
 
-static int find_colour(struct coverage_run *r)
-{
-    for (size_t i = 0; i < sizeof COLOURS / sizeof COLOURS[0]; i++)
-        if (strcmp(r->colour_name, COLOURS[i]) == 0) {
-            r->colour = (enum coverage_colour)i;
-            return APP_GO_ON;
-        }
-    return app_usage(&app_coverage, "--colour %s is not known; allowed seen, count, density, incidence",
-                     r->colour_name);
-}
-
 static int check_next(struct coverage_run *r)
 {
     struct coverage_next_options *o = &r->o;
@@ -237,15 +228,13 @@ static int check_next(struct coverage_run *r)
 
 static int check_options(struct coverage_run *r)
 {
-    if (r->by != NULL && strcmp(r->by, "label") != 0)
-        return app_usage(&app_coverage, "--by %s is not known; allowed label", r->by);
-    if (r->colour_name != NULL && r->output == NULL) return app_usage(&app_coverage, "--colour: allowed with -o FILE");
+    if (app_is_given(&r->in, "colour") && r->output == NULL)
+        return app_usage(&app_coverage, "--colour: allowed with -o FILE");
     if (r->output != NULL && !mesh_has_format(r->output))
         return app_usage(&app_coverage,
                          "-o %s: the file is a mesh; allowed is a name that ends in .ply, .obj, .gltf, .glb or .fbx",
                          r->output);
-    const int status = r->colour_name != NULL ? find_colour(r) : APP_GO_ON;
-    return status == APP_GO_ON ? check_next(r) : status;
+    return check_next(r);
 }
 
 /* A .gltf has its binary data in a .bin beside it. */
@@ -259,7 +248,8 @@ static int add_numbers(struct coverage_run *r)
 
 static int coverage_run_command(int argc, char **argv)
 {
-    struct coverage_run r = {.o = {.height_m = -1.0, .step_deg = -1.0, .scans = -1}}; /* negative: not given */
+    struct coverage_run r = {.by = -1,
+                             .o = {.height_m = -1.0, .step_deg = -1.0, .scans = -1}}; /* negative: not given */
     int status = app_parse(&app_coverage, argc, argv, &r.in, &r);
     if (status == APP_GO_ON) status = check_options(&r);
     if (status == APP_GO_ON) status = add_numbers(&r);
@@ -274,11 +264,11 @@ static const struct app_option OPTIONS[] = {
      .help = "print the figures as JSON: cell_m, cells, pieces, triangles, area_m2, duplicate_m2, silent_m2, none_m2, "
              "one_m2, several_m2 and these three as percent, density_1_m2, incidence_deg and range_m (mean, p05, p50, p95), "
              "stations, labels, next"},
-    {APP_TEXT, "by", "label", .at = AT(by), .help = "also print the figures of each label: object and material"},
+    {APP_CHOICE, "by", "label", .at = AT(by), OPTION_CHOICES(BY), .help = "also print the figures of each label: object and material"},
     {APP_TEXT, "output", "FILE", .letter = 'o', .at = AT(output), .file = APP_WRITES,
      .help = "write the cells as a mesh with colours; .ply has the scalars stations, density, incidence_deg, range_m "
              "and cell"},
-    {APP_TEXT, "colour", "WHAT", .at = AT(colour_name), OPTION_CHOICES(COLOURS),
+    {APP_CHOICE, "colour", "WHAT", .at = AT(colour), OPTION_CHOICES(COLOURS),
      .help = "colours of the mesh: seen (by no station red, by one yellow, by several green; the default), count (of "
              "stations, blue to red), density (blue to red, in decades), incidence (blue head on to red grazing)"},
     {APP_WHOLE, "next", "N", .min = 1, .max = COVERAGE_MOST_NEXT, .at = AT(o.stations),

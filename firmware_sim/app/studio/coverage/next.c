@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "core/angle.h"
+#include "core/mat3.h"
 #include "firmware_sim/app/options.h"
 #include "firmware_sim/config/profile.h"
 
@@ -22,18 +23,11 @@ struct chooser {
 
 /* ---- rounds */
 
-static void next_turn(const double dir[3], double heading_rad, double out[3])
-{
-    const double s = sin(heading_rad), c = cos(heading_rad);
-    out[0] = c * dir[0] + s * dir[1];
-    out[1] = c * dir[1] - s * dir[0];
-    out[2] = dir[2];
-}
-
 /* Estimates the gains of all places with one heading, which share their directions. */
 static int estimate(struct chooser *c, double heading_deg, double (*turned)[3], struct sh_err *err)
 {
     const struct config_profile *profile = site_profile(c->f->site);
+    double rotation[9];
     c->n_open = 0;
     for (uint32_t i = 0; i < c->f->next->n; i++) {
         const struct coverage_next_place *p = &c->f->next->place[i];
@@ -41,8 +35,9 @@ static int estimate(struct chooser *c, double heading_deg, double (*turned)[3], 
         memcpy(c->open_m[c->n_open], p->position_m, sizeof *c->open_m);
         c->open[c->n_open++] = i;
     }
+    pose_heading(angle_rad(heading_deg), rotation);
     for (uint32_t i = 0; i < c->f->n_dir; i++)
-        next_turn(c->f->dir[i], angle_rad(heading_deg), turned[i]);
+        mat3_apply(rotation, c->f->dir[i], turned[i]);
     const struct coverage_directions directions = {c->f->n_dir, (const double(*)[3])turned, c->f->each_sr,
                                                    profile->range_min_m, profile->range_max_m};
     const struct coverage_places places = {c->n_open, (const double(*)[3])c->open_m, NULL};

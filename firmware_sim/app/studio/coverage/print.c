@@ -6,6 +6,7 @@
 #include <stdlib.h>
 
 #include "core/angle.h"
+#include "firmware_sim/app/ranking.h"
 #include "firmware_sim/app/studio/coverage/coverage.h"
 #include "firmware_sim/app/studio/page_json.h"
 #include "firmware_sim/config/places.h"
@@ -42,22 +43,17 @@ static void print_stations(const struct coverage_result *r)
 
 /* ---- by label, the largest unseen area first */
 
-static int print_compare(const void *a, const void *b, void *ctx)
+static double unseen_m2(const void *label, uint32_t i)
 {
-    const struct coverage_of_label *label = ctx;
-    const uint32_t i = *(const uint32_t *)a, k = *(const uint32_t *)b;
-    const double x = label[i].area_m2 - label[i].seen_m2, y = label[k].area_m2 - label[k].seen_m2;
-    return x != y ? (x < y) - (x > y) : (i > k) - (i < k);
+    const struct coverage_of_label *l = (const struct coverage_of_label *)label + i;
+    return l->area_m2 - l->seen_m2;
 }
 
 static void print_labels(const struct coverage_result *r)
 {
     const uint32_t n = r->site->scene->n_surfaces;
-    uint32_t *order = malloc(n * sizeof *order);
+    uint32_t *order = ranking_make(n, unseen_m2, r->label);
     if (order == NULL) return;
-    for (uint32_t i = 0; i < n; i++)
-        order[i] = i;
-    qsort_r(order, n, sizeof *order, print_compare, r->label);
     printf("\n%12s %12s %8s %12s  %s\n", "area m2", "unseen m2", "seen %", "points/m2", "object | material");
     for (uint32_t i = 0; i < n; i++) {
         const struct coverage_of_label *l = &r->label[order[i]];
@@ -66,7 +62,7 @@ static void print_labels(const struct coverage_result *r)
         snprintf(name, sizeof name, "%s | %s", s->object, s->material);
         sh_keep_line(name); /* a mesh may have any bytes */
         if (l->seen_m2 > 0.0) snprintf(density, sizeof density, "%.4g", (double)l->pulses / l->seen_m2);
-        printf("%12.3f %12.3f %8.3f %12s  %s\n", l->area_m2, l->area_m2 - l->seen_m2,
+        printf("%12.3f %12.3f %8.3f %12s  %s\n", l->area_m2, unseen_m2(r->label, order[i]),
                coverage_percent(l->seen_m2, l->area_m2), density, name);
     }
     free(order);

@@ -2,9 +2,7 @@
 /* scanhead init: a first configuration for a mesh. */
 #include <errno.h>
 #include <fcntl.h>
-#include <libgen.h>
 #include <limits.h>
-#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -33,12 +31,6 @@ struct init_run {
     char path[CONFIG_PATH_LEN];                      /* of the mesh, as the configuration names it */
     struct init_mesh as;
 };
-
-static const char *base_of(const char *path)
-{
-    const char *slash = strrchr(path, '/');
-    return slash != NULL ? slash + 1 : path;
-}
 
 /* ---- place */
 
@@ -70,10 +62,10 @@ static int find_place(const struct init_run *run, const struct scene *scene, str
 static int find_path(const struct init_run *run, char path[CONFIG_PATH_LEN], struct sh_err *err)
 {
     char folder[CONFIG_PATH_LEN], mesh[PATH_MAX], from[PATH_MAX];
-    snprintf(folder, sizeof folder, "%s", run->output);
+    snprintf(folder, sizeof folder, "%.*s.", (int)(basename(run->output) - run->output), run->output);
     if (realpath(run->wish.file, mesh) == NULL)
         return sh_fail(err, SH_EINPUT, "%s: %s", run->wish.file, strerror(errno));
-    if (realpath(dirname(folder), from) == NULL) return sh_fail(err, SH_EINPUT, "%s: %s", folder, strerror(errno));
+    if (realpath(folder, from) == NULL) return sh_fail(err, SH_EINPUT, "%s: %s", run->output, strerror(errno));
     size_t same = 0, used = 0;
     for (size_t i = 0; mesh[i] == from[i] || (from[i] == '\0' && mesh[i] == '/'); i++) {
         if (mesh[i] == '/') same = i;
@@ -182,7 +174,7 @@ static void say_result(const struct init_run *run, const struct scene *s, const 
 static int write_config(struct init_run *run, const struct scene *scene, struct sh_err *err)
 {
     char link[64];
-    const char *base = base_of(run->output);
+    const char *base = basename(run->output);
     struct config_profile profile;
     struct viewpoint at;
     int stem = (int)(strrchr(base, '.') - base);
@@ -207,7 +199,7 @@ static int write_config(struct init_run *run, const struct scene *scene, struct 
 /* The default for house.ifc is house.yaml in the working directory. */
 static int choose_output(struct init_run *run)
 {
-    const char *base = base_of(run->wish.file), *dot = strrchr(base, '.');
+    const char *base = basename(run->wish.file), *dot = strrchr(base, '.');
     int stem = dot != NULL && dot != base ? (int)(dot - base) : (int)strlen(base);
     snprintf(run->name, sizeof run->name, "%s", base);
     sh_keep_line(run->name);

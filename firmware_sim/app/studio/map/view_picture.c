@@ -10,6 +10,7 @@
 #include "core/studio/cloud.h"
 #include "core/vec3.h"
 #include "firmware_sim/app/app.h"
+#include "firmware_sim/app/ranking.h"
 #include "firmware_sim/app/studio/map/view_inside.h"
 #include "firmware_sim/config/places.h"
 
@@ -128,34 +129,26 @@ static void name_label(const struct picturing *p, uint32_t label, char *out, siz
         snprintf(out, room, label == CLOUD_LABEL_NONE ? "no label" : "label %u", label);
 }
 
-struct counted {
-    uint32_t number;
-    uint64_t points;
-};
-
-static int by_points(const void *a, const void *b)
+/* Stations have the order of their numbers. */
+static double points_of(const void *ctx, uint32_t i)
 {
-    const struct counted *x = a, *y = b;
-    if (x->points != y->points) return x->points < y->points ? 1 : -1;
-    return x->number < y->number ? -1 : 1;
+    const struct picturing *p = ctx;
+    return p->plan->colour == MAP_VIEW_STATION ? p->number[i] > 0 : (double)p->number[i];
 }
 
 /* Draws the names of stations in the order of their numbers, those of labels with the most points first. */
 static int draw_names(const struct picturing *p, struct picture *picture, struct sh_err *err)
 {
     const int stations = p->plan->colour == MAP_VIEW_STATION;
-    struct counted *all = calloc(MAP_VIEW_NUMBERS, sizeof *all);
+    uint32_t *order = ranking_make(MAP_VIEW_NUMBERS, points_of, p), n = 0;
     struct view_entry entry[VIEW_MAX_NAMES];
-    uint32_t n = 0;
-    if (all == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the legend");
-    for (uint32_t i = 0; i < MAP_VIEW_NUMBERS; i++)
-        if (p->number[i] > 0) all[n++] = (struct counted){i, p->number[i]};
-    if (!stations) qsort(all, n, sizeof *all, by_points);
-    for (uint32_t i = 0; i < n && i < VIEW_MAX_NAMES; i++) {
-        colour_of(p, all[i].number, entry[i].rgb);
-        (stations ? name_station : name_label)(p, all[i].number, entry[i].name, sizeof entry[i].name);
+    if (order == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the legend");
+    for (; n < MAP_VIEW_NUMBERS && p->number[order[n]] > 0; n++) {
+        if (n >= VIEW_MAX_NAMES) continue; /* they are only counted */
+        colour_of(p, order[n], entry[n].rgb);
+        (stations ? name_station : name_label)(p, order[n], entry[n].name, sizeof entry[n].name);
     }
-    free(all);
+    free(order);
     view_draw_names(picture, stations ? "Stations" : "Surfaces", entry, n);
     return SH_OK;
 }

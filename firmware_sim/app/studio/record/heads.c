@@ -85,8 +85,8 @@ int heads_open(struct heads *heads, struct site *site, double scan_s, const stru
     heads->at = one;
     heads->first = &one->offline;
     one->is_open = 1;
-    return site != NULL ? offline_open_at(site, scan_s, report, &one->offline, err)
-                        : offline_open(one->cfg, NULL, scan_s, report, &one->offline, err);
+    one->offline.site = site;
+    return offline_open(one->cfg, NULL, scan_s, report, &one->offline, err);
 }
 
 const struct site *heads_site(const struct heads *heads)
@@ -96,16 +96,9 @@ const struct site *heads_site(const struct heads *heads)
 
 int heads_prepare(struct heads *heads, uint32_t station, struct sh_err *err)
 {
-    return offline_prepare(&heads->at->offline, station, heads->report, err);
-}
-
-/* All members of these structs are counts of 64 bits. */
-static void add_stream(struct scanhead_stats *sum, const struct scanhead_stats *more)
-{
-    uint64_t *to = (uint64_t *)(void *)sum;
-    const uint64_t *from = (const uint64_t *)(const void *)more;
-    for (size_t i = 0; i < sizeof *sum / sizeof *to; i++)
-        to[i] += from[i];
+    struct site *site = heads->at->offline.site;
+    if (station == 0) station = site->cfg->head.settings.station;
+    return site_open_sights(site, station - 1, 1, heads->report, err);
 }
 
 /* The hash of several streams is that of their hashes, as text, in the order of their heads. */
@@ -120,7 +113,7 @@ static void add_streams(const struct heads *heads, int hash, struct recording_re
         struct scanhead_stats stats;
         if (sh == NULL) continue;
         scanhead_get_stats(sh, &stats);
-        add_stream(&sum->stream, &stats);
+        recording_add_counts(&sum->stream, &stats, sizeof stats);
         scanhead_hash_hex(sh, hex);
         sha256_update(&ctx, 64, (const uint8_t *)hex);
     }

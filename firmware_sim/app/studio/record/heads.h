@@ -11,7 +11,7 @@
 
 #include "firmware_sim/app/studio/record/offline.h"
 #include "firmware_sim/app/studio/record/recording.h"
-#include "firmware_sim/app/sites.h"
+#include "firmware_sim/app/scanner_report.h"
 
 struct heads_one {
     struct config *cfg;
@@ -55,7 +55,7 @@ int heads_record(struct heads *heads, const struct recording_options *options, s
                  struct sh_err *err);
 /* The site of the head that scans now. */
 const struct site *heads_site(const struct heads *heads);
-/* For recording_options.prepare. */
+/* For recording_options.prepare. Stations count from 1; 0 is the station at power-up. No scan may be running. */
 int heads_prepare(struct heads *heads, uint32_t station, struct sh_err *err);
 void heads_close(struct heads *heads);
 

@@ -15,6 +15,7 @@ struct record_line {
     int quiet;
     double long_edge;                       /* negative: not given */
     long sparse_seed;                       /* likewise */
+    int las_version;                        /* 0: 1.2, 1: 1.4; negative: not given */
     int limited;                            /* --colour-limits */
     int raw;                                /* 1: raw.h reads the whole line instead */
     int raw_only;                           /* 1: an option that needs --raw was given */

@@ -104,40 +104,22 @@ static void offline_leave(struct host_source *source)
 static const struct host_source_ops offline_ops = {
     .lend = offline_lend, .write = offline_write, .wait = offline_wait, .close = offline_leave};
 
-/* Makes a head at off->site and a client that is connected to it, and starts the head's loop. */
-static int power_up(struct offline *off, double scan_s, const struct sh_report *report, struct sh_err *err)
+int offline_open(struct config *cfg, const struct site *beside, double scan_s, const struct sh_report *report,
+                 struct offline *off, struct sh_err *err)
 {
     struct device_options device = {.scan_s = scan_s, .truth = off->truth};
+    off->shares_site = off->site != NULL;
+    int rc = off->shares_site ? SH_OK : offline_load(cfg, beside, report, &off->site, err);
+    if (rc != SH_OK) return rc;
     off->memory = calloc(1, sizeof *off->memory);
     const struct link_spec spec = {.type = LINK_MEMORY, .memory = off->memory};
     const struct loop_options options = {.extra = &spec, .report = report};
     const struct host_source source = {.ops = &offline_ops, .fd = -1, .ctx = off, .name = "off line"};
     if (off->memory == NULL || (off->sh = host_open(&source)) == NULL)
         return sh_fail(err, SH_ENOMEM, "no memory for a head off line");
-    int rc = device_create(off->site, &device, &off->device, err);
+    rc = device_create(off->site, &device, &off->device, err);
     if (rc == SH_OK) rc = loop_create(off->site, off->device, &options, &off->loop, err);
     return rc == SH_OK ? loop_start(off->loop, err) : rc;
-}
-
-int offline_open_at(struct site *site, double scan_s, const struct sh_report *report, struct offline *off,
-                    struct sh_err *err)
-{
-    off->site = site;
-    off->shares_site = 1;
-    return power_up(off, scan_s, report, err);
-}
-
-int offline_open(struct config *cfg, const struct site *beside, double scan_s, const struct sh_report *report,
-                 struct offline *off, struct sh_err *err)
-{
-    int rc = offline_load(cfg, beside, report, &off->site, err);
-    return rc == SH_OK ? power_up(off, scan_s, report, err) : rc;
-}
-
-int offline_prepare(struct offline *off, uint32_t station, const struct sh_report *report, struct sh_err *err)
-{
-    if (station == 0) station = off->site->cfg->head.settings.station;
-    return site_open_sights(off->site, station - 1, 1, report, err);
 }
 
 static void end_loop(struct offline *off)

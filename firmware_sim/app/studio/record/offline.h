@@ -17,7 +17,7 @@ struct config;
 struct offline {
     const char *truth;   /* the caller's: file for the faults that are injected; NULL: none */
     struct scanhead *sh; /* the client's handle */
-    struct site *site;
+    struct site *site;   /* the caller's, loaded by offline_load, which stays; NULL: offline_open loads one */
     /* inner state */
     struct link_memory *memory; /* between head and client */
     struct device *device;
@@ -26,24 +26,19 @@ struct offline {
 };
 
 /* Loads the scene and starts the head. The head's own links stay closed. scan_s > 0: the head ends each scan after this
- * device time, to the pulse. cfg is changed (pace, links) and must live on. `offline` begins as zeros but for truth,
- * and is to be closed, also after an error. beside: a site to share a scene with, as for site_load_for, where cfg is
- * another scanner of its configuration; NULL: none. */
+ * device time, to the pulse. `offline` begins as zeros but for truth and site, and is to be closed, also after an
+ * error. cfg, beside: for offline_load, where there is no site. */
 int offline_open(struct config *cfg, const struct site *beside, double scan_s, const struct sh_report *report,
                  struct offline *offline, struct sh_err *err);
-/* The same in parts, for heads that are powered up one after the other at a loaded site: offline_load changes cfg and
- * gives the site, which site_free frees; offline_open_at uses it. */
+/* Loads a site for heads that are powered up one after the other. cfg is changed (pace, links) and must live on. beside:
+ * a site to share a scene with, as for site_load_for, where cfg is another scanner of its configuration; NULL: none. */
 int offline_load(struct config *cfg, const struct site *beside, const struct sh_report *report, struct site **site,
                  struct sh_err *err);
-int offline_open_at(struct site *site, double scan_s, const struct sh_report *report, struct offline *offline,
-                    struct sh_err *err);
-/* Ends the head, and frees its threads and its site. A site given to offline_open_at stays. The client's handle
+/* Ends the head, and frees its threads and its site. The caller's site stays. The client's handle
  * keeps what it knows. */
 void offline_stop(struct offline *offline);
 /* Ends the head, and completes the file `truth`. Returns the first error in writing it. Site and handle stay. */
 int offline_finish(struct offline *offline, struct sh_err *err);
-/* Prepares a scan from a station. Stations count from 1; 0 is the station at power-up. No scan may be running. */
-int offline_prepare(struct offline *offline, uint32_t station, const struct sh_report *report, struct sh_err *err);
 void offline_close(struct offline *offline);
 
 /* Joins a client that has a thread of its own to a head in this process. link becomes the head's end of a socket pair,

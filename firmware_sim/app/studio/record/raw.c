@@ -80,15 +80,14 @@ static int read_port(const char *text, const char **end)
     return (int)port;
 }
 
-/* Reads "HOST:PORT[,PORT...]", where HOST may be "[::1]". Returns 0 where the text is nothing like it. */
+/* Reads "[HOST:]PORT[,PORT...]", where HOST may be "[::1]". Returns 0 where the text is nothing like it. */
 static int read_place(const char *text, int max_ports, struct raw_place *place)
 {
     const char *colon = strrchr(text, ':');
-    if (colon == NULL || colon == text) return 0;
-    const int bracket = text[0] == '[' && colon[-1] == ']';
-    const int n = snprintf(place->host, sizeof place->host, "%.*s", (int)(colon - text) - 2 * bracket, text + bracket);
-    if (n <= 0 || n >= (int)sizeof place->host) return 0;
-    for (const char *at = colon + 1;; at++) {
+    const int len = colon != NULL ? (int)(colon - text) : 0, bracket = len > 0 && text[0] == '[' && colon[-1] == ']';
+    const int n = snprintf(place->host, sizeof place->host, "%.*s", len - 2 * bracket, text + bracket);
+    if (n < 0 || n >= (int)sizeof place->host) return 0;
+    for (const char *at = colon != NULL ? colon + 1 : text;; at++) {
         const int port = place->n_ports < max_ports ? read_port(at, &at) : -1;
         if (port < 0) return 0;
         place->port[place->n_ports++] = port;
@@ -111,7 +110,8 @@ static int read_source(struct raw *r)
     const char *source = r->in.operand[0];
     const int udp = strncmp(source, "udp:", 4) == 0, tcp = strncmp(source, "tcp:", 4) == 0;
     r->ops = udp ? &raw_udp : &raw_tcp;
-    if ((!udp && !tcp) || !read_place(source + 4, udp ? RAW_MAX_PORTS : 1, &r->place) || (tcp && r->place.port[0] == 0))
+    if ((!udp && !tcp) || !read_place(source + 4, udp ? RAW_MAX_PORTS : 1, &r->place) || r->place.host[0] == '\0' ||
+        (tcp && r->place.port[0] == 0))
         return app_usage(&command, "SOURCE %s: with --raw allowed are udp:ADDRESS:PORT,PORT,... and tcp:HOST:PORT",
                          source);
     if (port_twice(&r->place) != 0)
@@ -120,6 +120,11 @@ static int read_source(struct raw *r)
         return app_usage(&command, "%s: --send and --relay need tcp:HOST:PORT", source);
     if (r->n_sends > 0 && r->relay != NULL)
         return app_usage(&command, "--send and --relay: with --relay only the client sends; allowed is one of them");
+    if (r->relay != NULL && !read_place(r->relay, 1, &r->clients))
+        return app_usage(&command,
+                         "--relay %s: allowed is PORT or ADDRESS:PORT, with a port from 0 (the system's choice) to "
+                         "65535",
+                         r->relay);
     return APP_GO_ON;
 }
 

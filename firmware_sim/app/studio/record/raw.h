@@ -21,9 +21,9 @@ struct raw_send {
     size_t len;
 };
 
-/* Where the bytes come from. */
+/* Where the bytes come from, or clients. */
 struct raw_place {
-    char host[128];
+    char host[128];          /* "": none is given */
     int port[RAW_MAX_PORTS]; /* TCP: one */
     int n_ports;
 };
@@ -58,7 +58,7 @@ struct raw {
     double duration_s, wait_s; /* 0: not given */
     long ready_fd;
     int raw, quiet;
-    struct raw_place place;
+    struct raw_place place, clients; /* of the source; of --relay */
     const struct raw_ops *ops;
     /* the recording */
     struct capture capture;

@@ -38,21 +38,10 @@ static int connect_first(struct raw *r, struct tcp *tcp, struct sh_err *err)
     return talk_open(&tcp->talk[0], r, fd, began_ns, err);
 }
 
-/* "[ADDR:]PORT" */
 static int listen_for_clients(struct raw *r, struct tcp *tcp, struct sh_err *err)
 {
-    char host[128] = "", name[80];
-    const char *colon = strrchr(r->relay, ':'), *text = colon != NULL ? colon + 1 : r->relay;
-    char *end;
-    const long port = strtol(text, &end, 10);
-    if (end == text || *end != '\0' || port < 0 || port > 65535)
-        return sh_fail(err, SH_EINPUT,
-                       "--relay %s: allowed is PORT or ADDRESS:PORT, with a port from 0 (the system's "
-                       "choice) to 65535",
-                       r->relay);
-    const int bracket = r->relay[0] == '[' && colon > r->relay && colon[-1] == ']';
-    if (colon != NULL) snprintf(host, sizeof host, "%.*s", (int)(colon - r->relay) - 2 * bracket, r->relay + bracket);
-    const struct socket_place place = {.what = "--relay", .host = host, .port = (int)port};
+    char name[80];
+    const struct socket_place place = {.what = "--relay", .host = r->clients.host, .port = r->clients.port[0]};
     const int rc = socket_open(&place, &tcp->listen_fd, name, sizeof name, err);
     if (rc != SH_OK) return rc;
     stamped_enable(tcp->listen_fd); /* for the connections that it takes */

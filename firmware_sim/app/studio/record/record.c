@@ -38,27 +38,6 @@ static int take_repair(void *values, const char *text)
     return APP_OK;
 }
 
-/* The index of a word; APP_USAGE with the reason printed. */
-static int take_word(const char *option, const char *const *words, size_t n, const char *text, int *index)
-{
-    struct sh_err err;
-    *index = app_find_word(option, text, words, n, &err);
-    return *index >= 0 ? APP_OK : app_usage(&app_record, "%s", err.text);
-}
-
-static int take_colour(void *values, const char *text)
-{
-    struct record_line *r = values;
-    struct colour_choice *choice = &r->job.files.recorder.colour;
-    int i, status = take_word("colour", colour_words, COLOUR_MODES, text, &i);
-    if (status != APP_OK) return status;
-    r->job.texture = i == COLOUR_TEXTURE; /* the head sends these colours */
-    choice->given = !r->job.texture;
-    choice->scale.mode = (enum colour_mode)i;
-    r->job.files.own_limits = colour_has_limits(choice->scale.mode) && !r->limited;
-    return APP_OK;
-}
-
 static int take_colour_rgb(void *values, const char *text)
 {
     struct record_line *r = values;
@@ -84,7 +63,6 @@ static int take_colour_limits(void *values, const char *text)
     r->job.files.recorder.colour.scale.low = v[0];
     r->job.files.recorder.colour.scale.high = v[1];
     r->limited = 1;
-    r->job.files.own_limits = 0;
     return APP_OK;
 }
 
@@ -95,12 +73,7 @@ static int take_raw_only(void *values, const char *text)
     return APP_OK;
 }
 
-static const char *const ply_names[] = {"scanhead", "cloudcompare"};
-
-static int take_ply_names(void *values, const char *text)
-{
-    return take_word("ply-names", ply_names, 2, text, &((struct record_line *)values)->job.files.recorder.scalar_names);
-}
+static const char *const ply_names[] = {"scanhead", "cloudcompare"}, *const las_versions[] = {"1.2", "1.4"};
 
 static int take_ply_columns(void *values, const char *text)
 {
@@ -111,12 +84,14 @@ static int take_ply_columns(void *values, const char *text)
     return app_usage(&app_record, "--ply-columns %s: allowed, each once and with commas between:%s", text, allowed);
 }
 
-static int take_las_version(void *values, const char *text)
+/* Colours of textures are those that the head sends. */
+static void apply_choices(struct record_line *r)
 {
-    static const char *const words[] = {"1.2", "1.4"};
-    int i, status = take_word("las-version", words, 2, text, &i);
-    if (status == APP_OK) ((struct record_line *)values)->job.files.recorder.las_minor = 2 + 2 * i;
-    return status;
+    struct colour_choice *colour = &r->job.files.recorder.colour;
+    r->job.texture = colour->scale.mode == COLOUR_TEXTURE;
+    colour->given = app_is_given(&r->in, "colour") && !r->job.texture;
+    r->job.files.own_limits = colour_has_limits(colour->scale.mode) && !r->limited;
+    if (r->las_version >= 0) r->job.files.recorder.las_minor = 2 + 2 * r->las_version;
 }
 
 /* Checks the options of meshes, and of points spread over them. */
@@ -218,9 +193,11 @@ static int check_repair(const struct record_line *r)
 
 int record_line_read(struct record_line *r, int argc, char **argv)
 {
-    *r = (struct record_line){.job = {.recording = {.frames = -1}}, .long_edge = -1, .sparse_seed = -1};
+    *r = (struct record_line){
+        .job = {.recording = {.frames = -1}}, .long_edge = -1, .sparse_seed = -1, .las_version = -1};
     int status = app_parse(&app_record, argc, argv, &r->in, r);
     if (status != APP_GO_ON) return status;
+    apply_choices(r);
     if (r->raw_only) return app_usage(&app_record, "--send, --relay, --ready-fd: allowed with --raw");
     if (r->n_repairs > 0) return check_repair(r) == APP_GO_ON ? record_line_add_repaired(r) : APP_USAGE;
     if (r->job.files.n == 0 && r->job.stats == NULL) return app_usage(&app_record, "-o FILE is needed");
@@ -304,14 +281,14 @@ static const struct app_option OPTIONS[] = {
     {APP_NUMBER, "replug", "S", .min = 0.0, .max = 1e8, .at = AT(job.recording.replug_s),
      .help = "when the head is unplugged, wait up to S seconds for it and continue in the same files"},
     {APP_FLAG, "ascii", NULL, .at = AT(job.files.recorder.ascii), .help = "PLY as text"},
-    {APP_CALL, "ply-names", "WHOSE", .apply = take_ply_names, OPTION_CHOICES(ply_names),
+    {APP_CHOICE, "ply-names", "WHOSE", .at = AT(job.files.recorder.scalar_names), OPTION_CHOICES(ply_names),
      .help = "names of columns: scanhead (range, time, ..., the default), or cloudcompare (scalar_range, scalar_time, "
              "..., which CloudCompare shows)"},
     {APP_CALL, "ply-columns", "LIST", .apply = take_ply_columns,
      .help = "columns of .ply beside x, y, z: some of "
              "range,reflectance,time,echo,label,station,frame,attributes,colour; xyz: none of them; float: lengths as "
              "float, within 1 km of the origin (default: all, in double)"},
-    {APP_CALL, "colour", "BY", .apply = take_colour, OPTION_CHOICES(colour_words),
+    {APP_CHOICE, "colour", "BY", .at = AT(job.files.recorder.colour.scale.mode), OPTION_CHOICES(colour_words),
      .help = "value that red, green, blue in .ply, .las, .ptx, .e57 and the texture of meshes show: range, height, "
              "reflectance (grey, -30 to 0 dB), label (a hue per surface), frame (of a trajectory or stops), texture "
              "(of a CONFIG); or solid; none. Default: the colours that the head sends, if any (output.colour)"},
@@ -328,7 +305,7 @@ static const struct app_option OPTIONS[] = {
      .help = "write .ply as points spread evenly over the mesh that --mesh writes, DENSITY per square metre"},
     {APP_WHOLE, "sparse-seed", "N", .min = 0, .max = 1000000000, .at = AT(sparse_seed),
      .help = "seed of the random points: the same N gives the same points (default 1)"},
-    {APP_CALL, "las-version", "1.2|1.4", .apply = take_las_version,
+    {APP_CHOICE, "las-version", "1.2|1.4", .at = AT(las_version), OPTION_CHOICES(las_versions),
      .help = "version of .las; 1.2 is for older readers and holds no labels, and up to five returns of a pulse "
              "(default 1.4)"},
     {APP_FLAG, "wdp", NULL, .at = AT(job.files.recorder.las_wdp),

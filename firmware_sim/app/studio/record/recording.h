@@ -6,6 +6,7 @@
 #ifndef FIRMWARE_SIM_APP_STUDIO_RECORD_RECORDING_H
 #define FIRMWARE_SIM_APP_STUDIO_RECORD_RECORDING_H
 
+#include <stddef.h>
 #include <stdint.h>
 
 #include "core/err.h"
@@ -41,25 +42,32 @@ struct recording_options {
 };
 
 struct recording_result {
+    /* These are counts alone (recording_add). */
     uint64_t points, empty, frames; /* received; empty: shots without echo */
     uint64_t with_reflectance;      /* points whose reflectance is modelled */
-    struct recording_counts counts; /* of pulses and scans */
+    uint64_t unplaced;              /* points and empty shots that came before the descriptor and the anchor */
     uint64_t crowded, faint, unfit; /* hits that are no echoes, as the line ends count them */
     uint64_t lost_samples;          /* of waveforms: no room in the head */
+    uint64_t replugs, broken_scans; /* how often the head was away and came back; scans in which it was away */
+    uint64_t bus_resets;            /* how often its USB bus was reset, which ended the session */
+    struct recording_counts counts; /* of pulses and scans */
     char missing[128];              /* what was asked for and left out because of `interrupted`; empty: nothing */
     double wall_s;                  /* how long the recording took */
     struct scanhead_stats stream;   /* as the client counts */
     int is_file;                    /* the stream was read from a file */
-    uint64_t unplaced;              /* points and empty shots that came before the descriptor and the anchor */
     char sha256[65];                /* of the stream; empty where none was kept */
-    uint64_t replugs, broken_scans; /* how often the head was away and came back; scans in which it was away */
-    uint64_t bus_resets;            /* how often its USB bus was reset, which ended the session */
 };
 
 /* SH_OK, or the first failure. result is filled in both cases. */
 int recording_run(struct scanhead *sh, const struct recording_options *options, struct recording_result *result,
                   struct sh_err *err);
 
+/* Adds the counts in `more` to those in `sum`: `bytes` of each, which hold numbers of 64 bits alone. */
+static inline void recording_add_counts(void *sum, const void *more, size_t bytes)
+{
+    for (size_t i = 0; i < bytes / sizeof(uint64_t); i++)
+        ((uint64_t *)sum)[i] += ((const uint64_t *)more)[i];
+}
 /* Adds the figures of another part of the recording; not its wall_s, those of its stream, nor its hash. `missing`
  * becomes that of the other part. */
 void recording_add(struct recording_result *sum, const struct recording_result *more);

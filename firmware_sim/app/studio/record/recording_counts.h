@@ -22,7 +22,7 @@ struct recording_counts {
     uint64_t left_out;    /* in frames that the head left out for this reader, as it says */
     uint64_t missing;     /* delivered by the head in scans that ended, and not received, whatever the reason */
     uint64_t unknown; /* scans that ended, and whose final counts did not come: fired, cast and missing may be more */
-    /* inner state: the scan at hand */
+    /* Inner state: the scan at hand. What is above are counts alone (recording_add). */
     int within; /* points of it came, and its end did not */
     struct {
         uint32_t number;                 /* 0: not known */

@@ -8,25 +8,8 @@
 
 void recording_add(struct recording_result *sum, const struct recording_result *more)
 {
-    sum->points += more->points;
-    sum->empty += more->empty;
-    sum->frames += more->frames;
-    sum->with_reflectance += more->with_reflectance;
-    sum->counts.scans += more->counts.scans;
-    sum->counts.pulses += more->counts.pulses;
-    sum->counts.fired += more->counts.fired;
-    sum->counts.cast += more->counts.cast;
-    sum->counts.lost += more->counts.lost;
-    sum->counts.left_out += more->counts.left_out;
-    sum->counts.missing += more->counts.missing;
-    sum->counts.unknown += more->counts.unknown;
-    sum->crowded += more->crowded;
-    sum->lost_samples += more->lost_samples;
-    sum->faint += more->faint;
-    sum->unfit += more->unfit;
-    sum->replugs += more->replugs;
-    sum->broken_scans += more->broken_scans;
-    sum->bus_resets += more->bus_resets;
+    recording_add_counts(sum, more, offsetof(struct recording_result, counts));
+    recording_add_counts(&sum->counts, &more->counts, offsetof(struct recording_counts, within));
     memcpy(sum->missing, more->missing, sizeof sum->missing);
 }
 

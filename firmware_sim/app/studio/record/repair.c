@@ -62,10 +62,7 @@ int record_repair(const char *const *paths, int n, const char *stats, int quiet)
     struct sh_err err = {0};
     struct results all = {.of = calloc((size_t)n, sizeof *all.of), .n = n};
     int status = APP_OK;
-    if (all.of == NULL) {
-        sh_fail(&err, SH_ENOMEM, "no memory");
-        return app_fail(&err);
-    }
+    if (all.of == NULL) return app_fail(&(struct sh_err){SH_ENOMEM, "no memory"});
     for (int i = 0; i < n; i++) {
         struct result *r = &all.of[i];
         r->path = paths[i];

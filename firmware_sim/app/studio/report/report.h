@@ -34,6 +34,8 @@ struct report_figures {
     struct figures_times *times; /* NULL: the file has no times */
     double *gap_s;               /* pauses longer than that are counted */
     struct figures *label;       /* [n_surfaces + 1]: the last is of points whose surface is not known */
+    uint32_t *by_points;         /* [n_surfaces + 1]: numbers in `label`, the most points first */
+    uint32_t n_with_points;      /* of these */
     double range_step_m;
     uint32_t n_ranges;
     struct figures range[REPORT_MAX_RANGES], incidence[REPORT_INCIDENCES];
@@ -93,7 +95,7 @@ void report_name_ranges(const struct report *r, char (*name)[32]);
 void report_name_incidences(char (*name)[32]);
 void report_put_stations(FILE *out, const struct report *r);
 void report_put_bins(FILE *out, const struct report *r);
-int report_put_surfaces(FILE *out, const struct report *r, struct sh_err *err);
+void report_put_surfaces(FILE *out, const struct report *r);
 void report_put_times(FILE *out, const struct report *r);
 /* map.c: a figure of the page. */
 int report_put_map(const struct report *r, FILE *out, struct sh_err *err);

@@ -2,7 +2,6 @@
 /* Tables of the report's page. */
 #include <inttypes.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "core/studio/picture.h"
@@ -124,31 +123,14 @@ void report_put_bins(FILE *out, const struct report *r)
     end_table(out);
 }
 
-struct ranked {
-    size_t points;
-    uint32_t label;
-};
-
-static int by_points(const void *a, const void *b)
+void report_put_surfaces(FILE *out, const struct report *r)
 {
-    const struct ranked *x = a, *y = b;
-    return x->points != y->points ? (x->points < y->points) - (x->points > y->points)
-                                  : (x->label > y->label) - (x->label < y->label);
-}
-
-int report_put_surfaces(FILE *out, const struct report *r, struct sh_err *err)
-{
-    uint32_t n = 0;
-    struct ranked *ranked = malloc(((size_t)r->site->n_surfaces + 1) * sizeof *ranked);
-    if (ranked == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %u surfaces", r->site->n_surfaces);
-    for (uint32_t i = 0; i <= r->site->n_surfaces; i++)
-        if (r->f.label[i].points > 0) ranked[n++] = (struct ranked){r->f.label[i].points, i};
-    qsort(ranked, n, sizeof *ranked, by_points);
+    const uint32_t n = r->f.n_with_points;
     fputs("<h2>Surfaces</h2>\n", out);
     begin_table(out, "By surface: object | material; most points first.", "surface", 0);
     for (uint32_t k = 0; k < n && k < MOST_LABELS; k++) {
         char name[REPORT_SURFACE_LEN] = "surface not known";
-        const uint32_t i = ranked[k].label;
+        const uint32_t i = r->f.by_points[k];
         if (i < r->site->n_surfaces) report_name_surface(site_surface(r->site, i), name);
         put_row(out, name, &r->f.label[i], NULL);
     }
@@ -156,8 +138,6 @@ int report_put_surfaces(FILE *out, const struct report *r, struct sh_err *err)
     if (n > MOST_LABELS)
         fprintf(out, "<p class=\"soft\">%u more surfaces have points; <code>--json</code> has all of them.</p>\n",
                 n - MOST_LABELS);
-    free(ranked);
-    return SH_OK;
 }
 
 static void put_echoes(FILE *out, const struct report *r)

@@ -113,33 +113,20 @@ static void print_line(const char *name, const struct figures *f)
 /* The surfaces with the most points first, up to MOST_LABELS. */
 static void print_labels(const struct report *r)
 {
-    const uint32_t n = r->site->n_surfaces + 1;
-    uint32_t with_points = 0, printed = 0;
-    size_t last = SIZE_MAX;
-    for (uint32_t i = 0; i < n; i++)
-        with_points += r->f.label[i].points > 0;
+    const uint32_t n = r->f.n_with_points;
     print_head("by surface");
-    while (printed < with_points && printed < MOST_LABELS) {
-        size_t most = 0;
-        for (uint32_t i = 0; i < n; i++)
-            if (r->f.label[i].points < last && r->f.label[i].points > most) most = r->f.label[i].points;
-        for (uint32_t i = 0; i < n && printed < MOST_LABELS; i++) {
-            char number[32] = "not known";
-            if (r->f.label[i].points != most) continue;
-            if (i + 1 < n) snprintf(number, sizeof number, "label %" PRIu32, i);
-            print_row(number, &r->f.label[i]);
-            if (i + 1 < n) {
-                char name[REPORT_SURFACE_LEN];
-                report_name_surface(site_surface(r->site, i), name);
-                printf("  %s", name);
-            }
-            putchar('\n');
-            printed++;
+    for (uint32_t k = 0; k < n && k < MOST_LABELS; k++) {
+        const uint32_t i = r->f.by_points[k];
+        char number[32] = "not known", name[REPORT_SURFACE_LEN];
+        if (i < r->site->n_surfaces) snprintf(number, sizeof number, "label %" PRIu32, i);
+        print_row(number, &r->f.label[i]);
+        if (i < r->site->n_surfaces) {
+            report_name_surface(site_surface(r->site, i), name);
+            printf("  %s", name);
         }
-        last = most;
+        putchar('\n');
     }
-    if (printed < with_points)
-        printf("not shown: %u more with points; --json has all of them\n", with_points - printed);
+    if (n > MOST_LABELS) printf("not shown: %u more with points; --json has all of them\n", n - MOST_LABELS);
 }
 
 static void print_tables(const struct report *r)

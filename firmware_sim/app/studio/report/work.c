@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 
 #include "core/mat3.h"
+#include "firmware_sim/app/ranking.h"
 #include "firmware_sim/app/studio/report/report.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/places.h"
@@ -202,6 +203,20 @@ static int tables(struct report *r, struct sh_err *err)
     return rc;
 }
 
+static double points_of(const void *label, uint32_t i)
+{
+    return (double)((const struct figures *)label)[i].points;
+}
+
+static int rank_labels(struct report *r, struct sh_err *err)
+{
+    const uint32_t n = r->site->n_surfaces + 1;
+    for (uint32_t i = 0; i < n; i++)
+        r->f.n_with_points += r->f.label[i].points > 0;
+    r->f.by_points = ranking_make(n, points_of, r->f.label);
+    return r->f.by_points != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory for %u surfaces", n - 1);
+}
+
 static int densities(struct report *r, struct sh_err *err)
 {
     struct report_figures *f = &r->f;
@@ -245,6 +260,7 @@ int report_work(struct report *r, struct sh_err *err)
     if (rc != SH_OK) return rc;
     rc = sh_check_stop(&app_report_seconds, err);
     if (rc == SH_OK) rc = tables(r, err);
+    if (rc == SH_OK) rc = rank_labels(r, err);
     if (rc == SH_OK) rc = densities(r, err);
     if (rc == SH_OK) rc = times(r, err);
     if (rc != SH_OK) return rc;
@@ -271,6 +287,7 @@ void report_free(struct report *r)
     free(r->f.times);
     free(r->f.gap_s);
     free(r->f.label);
+    free(r->f.by_points);
     figures_density_free(&r->f.density);
     deviation_points_free(&r->points);
     cloud_free(&r->cloud);

@@ -18,40 +18,45 @@
  * times, and far below a usual jump. PPS_WITHIN_S: the longest time between two pulses. */
 static const double STEP_S = 1e-3, GAIN_S = 1e-6, PPS_WITHIN_S = 1.5;
 
-/* Returns why a client can't notice faults of a kind; NULL: it can. */
+/* Why a client can't notice faults of a kind. */
+static const char NMEA[] = "only the receiver's sentences and a VLP-16's packets show it",
+                  NTP[] = "only the dates of a SICK scanner's scans show it",
+                  MIRROR[] = "only the polar layout of a line head has the encoder of the mirror";
+static const char *const hidden[FAULT_N_KINDS] = {
+    [FAULT_PAN_SLIP] = "no encoder shows it; only points that no longer fit do",
+    [FAULT_WINDOW_SOILED] = "amplitudes fall: a client has no others to compare with",
+    [FAULT_COUNTERS_HIGH] = "counters continue after their wrap",
+    [FAULT_NMEA_LOST] = NMEA,
+    [FAULT_NMEA_LATE] = NMEA,
+    [FAULT_NMEA_VOID] = NMEA,
+    [FAULT_NMEA_CHECKSUM] = NMEA,
+    [FAULT_NTP_SILENT] = NTP,
+    [FAULT_NTP_KISS] = NTP,
+    [FAULT_NTP_UNSYNC] = NTP,
+    [FAULT_NTP_STEP] = NTP,
+    [FAULT_PTP_ASYMMETRY] = "a follower can't see it; only another clock does",
+    [FAULT_PTP_JITTER] = "the noise of the path looks the same",
+    [FAULT_PTP_NO_SYNC] = "the follower keeps its states; only its offset no longer changes",
+    [FAULT_MIRROR_SLOW] = MIRROR,
+    [FAULT_MIRROR_STUCK] = MIRROR,
+    [FAULT_MIRROR_WOBBLE] = MIRROR,
+};
+/* Why the fault, or the run, may end before the client can notice it. */
+static const char PTP[] = "the follower's state and offset showed nothing of it in that time";
+static const char *const unseen[FAULT_N_KINDS] = {
+    [FAULT_LEAP_SECOND] = "the minute with the leap second was not over",
+    [FAULT_SLOW_BOOT] = "at this pace it may end before a client connects",
+    [FAULT_PTP_LOST] = PTP,
+    [FAULT_PTP_FAULTY] = PTP,
+    [FAULT_PTP_GRANDMASTER] = PTP,
+    [FAULT_PTP_STEP] = PTP,
+};
+
+/* Returns NULL where a client can notice faults of the kind. */
 static const char *why_hidden(const struct soak *soak, enum fault_kind kind)
 {
     const int has_mirror = soak->cfg->profile.emitter.kind == EMITTER_LINE && soak->cfg->output.layout == LINE_POLAR;
-    switch (kind) {
-    case FAULT_PAN_SLIP:
-        return "no encoder shows it; only points that no longer fit do";
-    case FAULT_WINDOW_SOILED:
-        return "amplitudes fall: a client has no others to compare with";
-    case FAULT_COUNTERS_HIGH:
-        return "counters continue after their wrap";
-    case FAULT_NMEA_LOST:
-    case FAULT_NMEA_LATE:
-    case FAULT_NMEA_VOID:
-    case FAULT_NMEA_CHECKSUM:
-        return "only the receiver's sentences and a VLP-16's packets show it";
-    case FAULT_NTP_SILENT:
-    case FAULT_NTP_KISS:
-    case FAULT_NTP_UNSYNC:
-    case FAULT_NTP_STEP:
-        return "only the dates of a SICK scanner's scans show it";
-    case FAULT_PTP_ASYMMETRY:
-        return "a follower can't see it; only another clock does";
-    case FAULT_PTP_JITTER:
-        return "the noise of the path looks the same";
-    case FAULT_PTP_NO_SYNC:
-        return "the follower keeps its states; only its offset no longer changes";
-    case FAULT_MIRROR_SLOW:
-    case FAULT_MIRROR_STUCK:
-    case FAULT_MIRROR_WOBBLE:
-        return has_mirror ? NULL : "only the polar layout of a line head has the encoder of the mirror";
-    default:
-        return NULL;
-    }
+    return hidden[kind] == MIRROR && has_mirror ? NULL : hidden[kind];
 }
 
 /* ---- what was done */
@@ -364,22 +369,10 @@ void soak_saw_inside(struct soak_link *link, const struct scanhead_frame *frame)
 
 /* ---- at the end */
 
-/* Returns why a fault, or the run, may end before the client can notice the fault; NULL: it must be noticed. */
+/* Returns NULL where it must be noticed. */
 static const char *why_unseen(const struct soak_link *link, enum fault_kind kind)
 {
-    switch (kind) {
-    case FAULT_LEAP_SECOND:
-        return "the minute with the leap second was not over";
-    case FAULT_PTP_LOST:
-    case FAULT_PTP_FAULTY:
-    case FAULT_PTP_GRANDMASTER:
-    case FAULT_PTP_STEP:
-        return "the follower's state and offset showed nothing of it in that time";
-    case FAULT_SLOW_BOOT:
-        return link->soak->realtime ? NULL : "at this pace it may end before a client connects";
-    default:
-        return NULL;
-    }
+    return kind == FAULT_SLOW_BOOT && link->soak->realtime ? NULL : unseen[kind];
 }
 
 int soak_is_head_seen(struct soak_link *link)

@@ -43,11 +43,16 @@ static void decide(struct soak_row *row, uint64_t n, int was_noticed)
 
 /* ---- what each kind must show */
 
+static int is_gap(const struct soak_fact *f)
+{
+    return f->got == 0 && (f->marks & SOAK_GAP) != 0;
+}
+
 /* The frame must be missing, with a gap at its number. */
 static void judge_destroyed(struct soak_link *link, const struct soak_fact *f)
 {
     for (size_t i = 0; i < N_DESTROYING; i++)
-        decide(&link->row[destroying[i]], f->times[destroying[i]], f->got == 0 && f->gap);
+        decide(&link->row[destroying[i]], f->times[destroying[i]], is_gap(f));
 }
 
 static void judge_resealed(struct soak_link *link, const struct soak_fact *f, int is_known, int is_wrong)
@@ -61,7 +66,7 @@ static void judge_resealed(struct soak_link *link, const struct soak_fact *f, in
     else if (f->got != 0 && is_wrong)
         row->accepted += f->resealed;
     else
-        decide(row, f->resealed, f->got == 0 && f->gap); /* refused for what it holds, or late */
+        decide(row, f->resealed, is_gap(f)); /* refused for what it holds, or late */
 }
 
 static void judge_duplicate(struct soak_link *link, const struct soak_fact *f)
@@ -80,7 +85,8 @@ static int nothing_overtook(struct soak_link *link, const struct soak_fact *f)
 {
     for (uint32_t i = 1; i <= f->behind; i++) {
         const struct soak_fact *next = soak_fact_at(link, f->seq + i);
-        if (next == NULL || !(is_destroyed(next) || next->times[FAULT_REORDER] != 0 || next->away)) return 0;
+        if (next == NULL || !(is_destroyed(next) || next->times[FAULT_REORDER] != 0 || (next->marks & SOAK_AWAY) != 0))
+            return 0;
     }
     return 1;
 }
@@ -159,7 +165,7 @@ static void judge_same_bytes(struct soak_link *link, const struct soak_fact *f)
         else if (is_destroyed(f))
             soak_hide(&link->row[kinds[i]], f->times[kinds[i]], "the frame was destroyed besides");
         else /* its datagrams have the wrong length */
-            decide(&link->row[kinds[i]], f->times[kinds[i]], f->got == 0 && f->gap);
+            decide(&link->row[kinds[i]], f->times[kinds[i]], is_gap(f));
     }
 }
 
@@ -172,7 +178,7 @@ static uint64_t bad_bytes_of(const struct soak_link *link, const struct soak_fac
     uint64_t n = f->garbage;
     /* A datagram whose bits changed does not arrive: its checksum is wrong. */
     if (link->datagrams != NULL && f->times[FAULT_FLIP] != 0) return n;
-    if (link->datagrams != NULL && (f->merged || f->times[FAULT_SPLIT] != 0)) return n + clean->len;
+    if (link->datagrams != NULL && ((f->marks & SOAK_MERGED) != 0 || f->times[FAULT_SPLIT] != 0)) return n + clean->len;
     if (is_destroyed(f) && f->times[FAULT_DROP] == 0)
         n += (uint64_t)(f->cut_to != 0 ? f->cut_to : clean->len) * (1 + f->copies);
     return n;
@@ -188,8 +194,8 @@ static void judge_loss(struct soak_link *link, const struct soak_fact *f)
     }
     if (f->times[FAULT_REORDER] != 0 && f->late != 0)
         link->row[FAULT_REORDER].lost++;
-    else if (link->datagrams != NULL && (f->merged || f->times[FAULT_SPLIT] != 0))
-        link->row[f->merged ? FAULT_MERGE : FAULT_SPLIT].lost++;
+    else if (link->datagrams != NULL && ((f->marks & SOAK_MERGED) != 0 || f->times[FAULT_SPLIT] != 0))
+        link->row[(f->marks & SOAK_MERGED) != 0 ? FAULT_MERGE : FAULT_SPLIT].lost++;
     else if (f->resealed != 0)
         link->row[SOAK_RESEALED].lost++;
     else
@@ -202,7 +208,7 @@ static void judge_frame(struct soak_link *link, const struct soak_fact *f)
     const int is_known = get_clean(link, f->seq, &clean);
     const uint64_t bad = bad_bytes_of(link, f, &clean);
     link->expected_bad_max += bad;
-    if (f->away) {
+    if ((f->marks & SOAK_AWAY) != 0) {
         link->away++;
         hide_all(link, f, "there was no session then");
         return;

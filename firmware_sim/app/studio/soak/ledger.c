@@ -45,6 +45,15 @@ static struct soak_fact *touch(struct soak_link *link, soak_seq seq)
     return fact;
 }
 
+/* Marks the frames before `to`. */
+static void mark(struct soak_link *link, soak_seq from, soak_seq to, unsigned marks)
+{
+    for (; from < to; from++) {
+        struct soak_fact *fact = touch(link, from);
+        if (fact != NULL) fact->marks |= marks;
+    }
+}
+
 /* ---- what was done */
 
 static void take_kind(struct soak_fact *fact, const struct fault_note *note)
@@ -70,15 +79,6 @@ static void take_kind(struct soak_fact *fact, const struct fault_note *note)
         break;
     default:
         break;
-    }
-}
-
-/* Marks the frames that went into one datagram. */
-static void mark_merged(struct soak_link *link, const struct fault_note *note)
-{
-    for (uint64_t i = 0; i < note->n; i++) {
-        struct soak_fact *fact = touch(link, soak_unit(note->number + i));
-        if (fact != NULL) fact->merged = 1;
     }
 }
 
@@ -146,7 +146,8 @@ static void hit_frame(struct soak_link *link, const struct fault_note *note)
     else
         fact->times[note->kind]++;
     take_kind(fact, note);
-    if (note->kind == FAULT_MERGE && link->datagrams != NULL) mark_merged(link, note);
+    if (note->kind == FAULT_MERGE && link->datagrams != NULL)
+        mark(link, soak_unit(note->number), soak_unit(note->number + note->n), SOAK_MERGED);
 }
 
 static void hit_reply(struct soak_link *link, const struct fault_note *note)
@@ -203,22 +204,12 @@ void soak_heard(void *ctx, const struct fault_note *note)
 
 /* ---- what the client saw */
 
-/* Marks frames that came while there was no session. */
-static void mark_away(struct soak_link *link, soak_seq from, soak_seq to)
-{
-    if (to > from + SOAK_RING / 2) from = to - SOAK_RING / 2;
-    for (soak_seq seq = from; seq < to; seq++) {
-        struct soak_fact *fact = touch(link, seq);
-        if (fact != NULL) fact->away = 1;
-    }
-}
-
+/* Frames before this one came while there was no session. */
 static void ledger_begin(struct soak_link *link, soak_seq seq)
 {
-    if (link->begun)
-        mark_away(link, link->last + 1, seq);
-    else if (link->judged != 0)
-        mark_away(link, link->judged, seq); /* marks nothing if the first fault is of a later frame */
+    soak_seq from = link->begun ? link->last + 1 : link->judged != 0 ? link->judged : seq;
+    if (seq > from + SOAK_RING / 2) from = seq - SOAK_RING / 2;
+    mark(link, from, seq, SOAK_AWAY); /* none where the first fault is of a later frame */
     if (!link->begun && (link->judged == 0 || link->judged > seq)) link->judged = seq;
     if (!link->begun) link->first = seq;
     link->begun = link->in_session = 1;
@@ -229,8 +220,8 @@ static void mark_refused(struct soak_link *link, soak_seq to)
 {
     for (soak_seq seq = link->last + 1; seq < to && link->refused_now > 0; seq++) {
         struct soak_fact *fact = touch(link, seq);
-        if (fact == NULL || fact->gap || fact->got != 0) continue;
-        fact->gap = 1;
+        if (fact == NULL || (fact->marks & SOAK_GAP) != 0 || fact->got != 0) continue;
+        fact->marks |= SOAK_GAP;
         link->refused_now--;
     }
     link->refused_now = 0;
@@ -267,12 +258,7 @@ void soak_saw_unit(struct soak_link *link, soak_seq seq, uint64_t digest, uint32
     if (!link->begun) ledger_begin(link, seq);
     struct soak_fact *fact = touch(link, seq);
     if (fact == NULL) return;
-    if (seq > link->last || fact->seq == link->first) {
-        for (soak_seq gap = link->last + 1; gap < seq && link->frames != 0; gap++) {
-            struct soak_fact *missing = touch(link, gap);
-            if (missing != NULL) missing->gap = 1;
-        }
-    }
+    if (link->frames != 0) mark(link, link->last + 1, seq, SOAK_GAP);
     if (fact->got != 0)
         fact->repeated++;
     else if (seq < link->last)
@@ -297,10 +283,7 @@ static void add_gap(struct soak_link *link, const struct scanhead_notice *notice
 {
     const soak_seq from = soak_seq_of(link->soak, notice->seq);
     const uint64_t n = notice->n < SOAK_RING / 2 ? notice->n : SOAK_RING / 2;
-    for (soak_seq seq = from; seq < from + n; seq++) {
-        struct soak_fact *fact = touch(link, seq);
-        if (fact != NULL) fact->gap = 1;
-    }
+    mark(link, from, from + n, SOAK_GAP);
 }
 
 static void add_again(struct soak_link *link, const struct scanhead_notice *notice)

@@ -14,18 +14,20 @@ struct soak_link;
 enum { SOAK_MAX_RUNS = 1024, SOAK_MAX_ACTS = 64 };
 
 /* A frame of a link. */
+/* It is missing; there was no session then; it went into one datagram with others. */
+enum { SOAK_GAP = 1, SOAK_AWAY = 2, SOAK_MERGED = 4 };
 struct soak_fact {
     soak_seq seq;
     int there;
+    unsigned marks;
     /* what the client saw */
     uint64_t digest;
-    uint32_t got, gap, repeated, late;
+    uint32_t got, repeated, late;
     int64_t after_ns; /* clock at its arrival, minus its own device time; link->offset_ns is the smallest of these */
-    int away;         /* there was no session then */
     /* what was done to it */
     int64_t t_ns;
     uint8_t times[FAULT_REFUSE]; /* by kind */
-    uint8_t resealed, merged;    /* merged: it went into one datagram with others */
+    uint8_t resealed;
     uint32_t copies, behind, garbage;
     uint32_t cut_to; /* bytes that truncation left; 0: all */
     double for_ms;   /* delay, jitter and stall: the longest */

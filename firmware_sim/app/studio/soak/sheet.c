@@ -156,16 +156,21 @@ void soak_print(const struct soak *soak, FILE *out)
 
 /* ---- JSON */
 
-static void put_row(struct json *json, int row, const struct soak_row *r)
+static void put_sums(struct json *json, const struct soak_row *r)
 {
-    json_open_object(json, NULL);
-    json_string(json, "fault", row_name(row));
     json_uint(json, "injected", r->injected);
     json_uint(json, "noticed", r->noticed);
     json_uint(json, "hidden", r->hidden);
     json_uint(json, "missed", r->missed);
     json_uint(json, "lost", r->lost);
     json_uint(json, "wrongly_accepted", r->accepted);
+}
+
+static void put_row(struct json *json, int row, const struct soak_row *r)
+{
+    json_open_object(json, NULL);
+    json_string(json, "fault", row_name(row));
+    put_sums(json, r);
     if (r->hidden != 0) json_string(json, "hidden_because", r->why);
     json_close_object(json);
 }
@@ -231,12 +236,7 @@ void soak_put(struct json *json, const void *ctx)
     json_string(json, "stream_sha256", soak->stats.have_hash ? soak->stats.sha256 : NULL);
     json_string(json, "clean_sha256", soak->clean.sha256);
     json_close_object(json);
-    json_uint(json, "injected", sum.injected);
-    json_uint(json, "noticed", sum.noticed);
-    json_uint(json, "hidden", sum.hidden);
-    json_uint(json, "missed", sum.missed);
-    json_uint(json, "lost", sum.lost);
-    json_uint(json, "wrongly_accepted", sum.accepted);
+    put_sums(json, &sum);
     json_bool(json, "good", soak->n_failures == 0);
     json_open_array(json, "failures");
     for (uint32_t i = 0; i < soak->n_failures; i++)

@@ -239,12 +239,11 @@ static int take_scenario(void *values, const char *text)
 static int take_allowed(void *values, const char *text)
 {
     struct soak_options *o = values;
-    for (int check = 0; check < VERDICT_N_CHECKS; check++) {
-        if (strcmp(text, verdict_names[check]) != 0) continue;
-        o->verdicts.options.allowed |= 1U << check;
-        return APP_OK;
-    }
-    return app_usage(&app_soak, "--allow %s: there is no such check; allowed are those of --help", text);
+    struct sh_err err;
+    const int check = app_find_word("allow", text, verdict_names, VERDICT_N_CHECKS, &err);
+    if (check < 0) return app_usage(&app_soak, "%s", err.text);
+    o->verdicts.options.allowed |= 1U << check;
+    return APP_OK;
 }
 
 /* Some options go only with a client, and --truth goes only with one scenario. */

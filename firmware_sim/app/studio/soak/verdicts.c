@@ -106,18 +106,23 @@ static void put_all(struct json *json, const void *ctx)
     json_close_object(json);
 }
 
+static void put_junit(FILE *out, const void *ctx)
+{
+    const struct verdicts_work *work = ctx;
+    verdict_put_junit(work->made, work->n, out);
+}
+
 static int write_files(const struct verdicts_work *work, struct sh_err *err)
 {
     const struct verdicts *v = work->verdicts;
     int rc = v->json != NULL ? app_write_json(v->json, put_all, work, err) : SH_OK;
-    if (rc == SH_OK && v->junit != NULL) rc = verdict_write_junit(v->junit, work->made, work->n, err);
+    if (rc == SH_OK && v->junit != NULL) rc = app_write_file(v->junit, put_junit, work, err);
     return rc;
 }
 
 /* The folder that the user names, or a new one. */
 static int make_folder(struct verdicts *v, char *own, size_t cap, struct sh_err *err)
 {
-    const char *temporary = getenv("TMPDIR");
     if (v->options.folder != NULL && strlen(v->options.folder) > VERDICTS_MAX_FOLDER)
         return sh_fail(err, SH_EINPUT, "--client-folder: has %zu characters; allowed are %d", strlen(v->options.folder),
                        VERDICTS_MAX_FOLDER);
@@ -125,9 +130,8 @@ static int make_folder(struct verdicts *v, char *own, size_t cap, struct sh_err 
         if (mkdir(v->options.folder, 0777) == 0 || errno == EEXIST) return SH_OK;
         return sh_fail(err, SH_EINPUT, "--client-folder %s: %s", v->options.folder, strerror(errno));
     }
-    snprintf(own, cap, "%.300s/scanhead-soak-XXXXXX", temporary != NULL && temporary[0] != '\0' ? temporary : "/tmp");
-    v->options.folder = mkdtemp(own);
-    return v->options.folder != NULL ? SH_OK : sh_fail(err, SH_EIO, "%s: %s", own, strerror(errno));
+    v->options.folder = own;
+    return app_make_folder("soak", own, cap, err);
 }
 
 static int say_findings(const struct verdicts_work *work, struct sh_err *err)

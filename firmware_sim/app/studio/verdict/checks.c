@@ -231,10 +231,9 @@ void checks_no_points(struct verdict *v, enum verdict_state state, const char *w
             state == VERDICT_FOUND ? "its points can't be read" : why);
 }
 
-void checks_points(struct verdict *v, const struct match *m, const double unknown[3])
+void checks_points(struct verdict *v, const struct verdict_points *m, const double unknown[3])
 {
-    v->points =
-        (struct verdict_points){m->n, m->empty, m->unknown, m->repeated, m->sent, m->unit_m, m->within_m, m->frame};
+    v->points = *m;
     say(v, VERDICT_POINTS_READ, VERDICT_PASSED, "%zu points, of %zu that were sent; %zu shots without echo", m->n,
         m->sent, m->empty);
     if (m->unknown != 0)

@@ -23,6 +23,6 @@ void checks_judge(const struct checks *checks, struct verdict *verdict);
 /* The points were not compared; `why` says why. */
 void checks_no_points(struct verdict *verdict, enum verdict_state state, const char *why);
 /* The points were compared. unknown: the first unknown point. */
-void checks_points(struct verdict *verdict, const struct match *match, const double unknown[3]);
+void checks_points(struct verdict *verdict, const struct verdict_points *match, const double unknown[3]);
 
 #endif

@@ -4,7 +4,6 @@
 #include <inttypes.h>
 #include <stdio.h>
 
-#include "firmware_sim/app/app.h"
 #include "firmware_sim/app/studio/verdict/verdict.h"
 
 static void put_attribute(FILE *out, const char *name, const char *value)
@@ -50,12 +49,9 @@ static void put_suite(FILE *out, const struct verdict *v)
     fputs("  </testsuite>\n", out);
 }
 
-int verdict_write_junit(const char *path, const struct verdict *verdict, uint32_t n, struct sh_err *err)
+void verdict_put_junit(const struct verdict *verdict, uint32_t n, FILE *out)
 {
-    FILE *out;
     uint32_t found = 0;
-    const int rc = app_open_new(path, &out, err);
-    if (rc != SH_OK) return rc;
     for (uint32_t i = 0; i < n; i++)
         found += verdict_count(&verdict[i], VERDICT_FOUND);
     fprintf(out,
@@ -64,5 +60,4 @@ int verdict_write_junit(const char *path, const struct verdict *verdict, uint32_
     for (uint32_t i = 0; i < n; i++)
         put_suite(out, &verdict[i]);
     fputs("</testsuites>\n", out);
-    return app_close_new(path, out, err);
 }

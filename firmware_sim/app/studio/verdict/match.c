@@ -49,17 +49,14 @@ static int find_ways(const struct own_stream *stream, struct way ways[MAX_WAYS])
     const struct scanhead_info *info = &stream->info;
     const int stands = !info->moving && !stream->is_moved;
     int n = 0;
-    if (info->geo) {
-        add_way(ways, &n, info->crs == 0 ? "scene" : "the stream's CRS", 0);
-        for (int forward = 0; forward < 2 && info->crs == 0 && stands; forward++) {
+    if (info->geo || info->moving) {
+        const int is_scene = !info->geo || info->crs == 0;
+        add_way(ways, &n, is_scene ? "scene" : "the stream's CRS", 0);
+        for (int forward = 0; forward < 2 && is_scene && stands; forward++) {
             struct way *way = add_way(ways, &n, forward ? "head, x forward" : "head", forward);
             memcpy(way->turn, info->rotation, sizeof way->turn);
             memcpy(way->at, info->station_m, sizeof way->at);
         }
-        return n;
-    }
-    if (info->moving) {
-        add_way(ways, &n, "scene", 0);
         return n;
     }
     add_way(ways, &n, "head", 0);
@@ -161,7 +158,7 @@ static void match_take(void *ctx, size_t entry)
         match_index_join(taker->index, taker->first, entry);
 }
 
-static void count_groups(const struct match_index *index, struct match *m)
+static void count_groups(const struct match_index *index, struct verdict_points *m)
 {
     for (size_t i = 0; i < index->n; i++) {
         const struct match_entry *e = &index->entry[i];
@@ -174,8 +171,8 @@ static void count_groups(const struct match_index *index, struct match *m)
 
 /* With a large distance each point agrees with very many others, and takes long. So the loop often asks whether to
  * stop. */
-static int count_points(struct match_index *index, const struct match_input *in, const struct way *way, struct match *m,
-                        struct sh_err *err)
+static int count_points(struct match_index *index, const struct match_input *in, const struct way *way,
+                        struct verdict_points *m, struct sh_err *err)
 {
     const struct cloud *cloud = in->cloud;
     int rc = SH_OK;
@@ -215,29 +212,26 @@ static int is_within(const double p[3], double limit_m)
     return fabs(p[0]) <= limit_m && fabs(p[1]) <= limit_m && fabs(p[2]) <= limit_m;
 }
 
-static double single_unit_m(const struct cloud *cloud, double limit_m)
+static double largest_m(const struct cloud *cloud, double limit_m)
 {
     double largest = 0.0;
     for (size_t i = 0; i < cloud->n; i++)
         for (int k = 0; k < 3 && is_within(cloud->xyz_m[i], limit_m); k++)
             largest = fmax(largest, fabs(cloud->xyz_m[i][k]));
-    return cloud_single_unit(largest);
+    return largest;
 }
 
 double match_unit_m(const struct cloud *cloud, double limit_m)
 {
     const size_t step = cloud->n / TRIED_POINTS + 1;
     int decimals = 0, digits = 1;
-    double largest = 0.0;
-    if (!cloud->is_text) return cloud->is_single ? single_unit_m(cloud, limit_m) : cloud->count_m;
-    for (size_t i = 0; i < cloud->n; i++)
+    const double largest = cloud->is_text || cloud->is_single ? largest_m(cloud, limit_m) : 0.0;
+    if (!cloud->is_text) return cloud->is_single ? cloud_single_unit(largest) : cloud->count_m;
+    for (size_t i = 0; i < cloud->n; i += step)
         for (int k = 0; k < 3 && is_within(cloud->xyz_m[i], limit_m); k++) {
-            const double v = fabs(cloud->xyz_m[i][k]);
             char text[32];
-            if (v > largest) largest = v;
-            if (i % step != 0) continue;
             /* A double keeps 15 digits of a decimal number. Zeros at their end do not count: D.DDDD0000e-02. */
-            snprintf(text, sizeof text, "%.14e", v);
+            snprintf(text, sizeof text, "%.14e", fabs(cloud->xyz_m[i][k]));
             char *mark = strchr(text, 'e'), *end = mark;
             while (end[-1] == '0')
                 end--;
@@ -258,12 +252,12 @@ static double rounding_m(double limit_m)
     return fmax(4.0 * DBL_EPSILON * limit_m, 1e-9);
 }
 
-int match_points(const struct match_input *in, struct match *match, struct sh_err *err)
+int match_points(const struct match_input *in, struct verdict_points *match, struct sh_err *err)
 {
     const double limit_m = limit_of(in->stream);
     struct match_index index = {0};
     struct way ways[MAX_WAYS];
-    *match = (struct match){.unit_m = match_unit_m(in->cloud, limit_m)};
+    *match = (struct verdict_points){.unit_m = match_unit_m(in->cloud, limit_m)};
     match->within_m = index.within_m = fmax(match->unit_m + in->match_m, rounding_m(limit_m));
     int rc = index_stream(in, &index, err);
     if (rc == SH_OK) {

@@ -7,19 +7,8 @@
 
 #include "core/studio/cloud.h"
 #include "firmware_sim/app/studio/verdict/own_stream.h"
+#include "firmware_sim/app/studio/verdict/verdict.h"
 #include "firmware_sim/app/studio/verdict/watch.h"
-
-struct match {
-    size_t empty;            /* shots without echo: NaN three times, or 0 three times */
-    size_t n;                /* other points */
-    size_t unknown;          /* no pulse had them */
-    size_t repeated;         /* the client has them more often than they were sent */
-    size_t sent;             /* points that the head sent; a point that went to two sessions counts twice */
-    size_t again;            /* points in `sent` that agree with an earlier one; a repetition of these may go unseen */
-    size_t first_unknown;    /* index in the cloud */
-    const char *frame;       /* the coordinate frame in which they agree best */
-    double unit_m, within_m; /* the rounding of the file; how far a coordinate may differ */
-};
 
 struct match_input {
     const struct own_stream *stream;
@@ -31,7 +20,7 @@ struct match_input {
 };
 
 /* SH_ESTOPPED where report asks to stop. */
-int match_points(const struct match_input *in, struct match *match, struct sh_err *err);
+int match_points(const struct match_input *in, struct verdict_points *points, struct sh_err *err);
 
 /* Returns the rounding of a file's coordinates: in text the unit of the last digit, in single precision two units in
  * the last place of the largest coordinate, else cloud->count_m. Points with a coordinate beyond limit_m do not

@@ -225,7 +225,7 @@ static double match_of(const struct run *r)
 static int run_compare(struct run *r, struct sh_err *err)
 {
     struct cloud cloud;
-    struct match match;
+    struct verdict_points match;
     struct sh_err why;
     if (!is_new(r)) {
         snprintf(why.text, sizeof why.text, "%s: the client did not write it", r->points);

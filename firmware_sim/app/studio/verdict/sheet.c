@@ -65,7 +65,7 @@ static void put_points(const struct verdict_points *p, struct json *json)
     json_uint(json, "repeated", p->repeated);
     json_string(json, "frame", p->frame);
     json_double(json, "file_unit_m", p->unit_m);
-    json_double(json, "match_m", p->match_m);
+    json_double(json, "match_m", p->within_m);
     json_close_object(json);
 }
 

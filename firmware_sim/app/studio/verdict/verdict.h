@@ -4,6 +4,7 @@
 #ifndef FIRMWARE_SIM_APP_STUDIO_VERDICT_VERDICT_H
 #define FIRMWARE_SIM_APP_STUDIO_VERDICT_VERDICT_H
 
+#include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
 
@@ -38,10 +39,17 @@ struct verdict_result {
     char text[320]; /* the finding, the figures of a pass, or why it is not judged */
 };
 
+/* A client's points, compared with those of the head (match.h). */
 struct verdict_points {
-    uint64_t n, empty, unknown, repeated, sent;
-    double unit_m, match_m; /* the rounding of the file; how far coordinates may differ in all */
-    const char *frame;      /* in which they were compared; NULL: they were not */
+    size_t empty;            /* shots without echo: NaN three times, or 0 three times */
+    size_t n;                /* other points */
+    size_t unknown;          /* no pulse had them */
+    size_t repeated;         /* the client has them more often than they were sent */
+    size_t sent;             /* points that the head sent; a point that went to two sessions counts twice */
+    size_t again;            /* points in `sent` that agree with an earlier one; a repetition of these may go unseen */
+    size_t first_unknown;    /* index in the cloud */
+    const char *frame;       /* the coordinate frame in which they agree best; NULL: they were not compared */
+    double unit_m, within_m; /* the rounding of the file; how far a coordinate may differ */
 };
 
 /* A connection that a fault ended, or did not let begin. */
@@ -90,6 +98,6 @@ uint32_t verdict_count(const struct verdict *verdict, enum verdict_state state);
 void verdict_print(const struct verdict *verdict, FILE *out);
 void verdict_put(const struct verdict *verdict, struct json *json);
 /* JUnit XML: a test suite for each of the n scenarios, and in it a test case for each check. */
-int verdict_write_junit(const char *path, const struct verdict *verdict, uint32_t n, struct sh_err *err);
+void verdict_put_junit(const struct verdict *verdict, uint32_t n, FILE *out);
 
 #endif

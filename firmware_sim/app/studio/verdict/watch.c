@@ -18,11 +18,8 @@ static uint32_t link_of(uint32_t session)
 
 static void add_break(struct watch *w, const struct watch_break *broken)
 {
-    if (!grow(&w->broken, &w->room_broken, w->n_broken + 1, sizeof *w->broken)) {
-        w->is_short = 1;
-        return;
-    }
-    w->broken[w->n_broken++] = *broken;
+    w->is_short |= !grow(&w->broken, &w->room_broken, w->n_broken + 1, sizeof *w->broken);
+    if (!w->is_short) w->broken[w->n_broken++] = *broken;
 }
 
 /* A client is back on the link of that number. */
@@ -42,11 +39,8 @@ static void begin_session(struct watch *w, uint32_t session, int64_t t_ns)
     if ((w->must_ask >> (number - 1) & 1) == 0) come_back(w, number);
     if (number != w->chosen) return;
     if (w->first_open_ns == 0) w->first_open_ns = clock_now_ns();
-    if (!grow(&w->span, &w->room_span, w->n_span + 1, sizeof *w->span)) {
-        w->is_short = 1;
-        return;
-    }
-    w->span[w->n_span++] = (struct watch_span){session, t_ns, INT64_MAX};
+    w->is_short |= !grow(&w->span, &w->room_span, w->n_span + 1, sizeof *w->span);
+    if (!w->is_short) w->span[w->n_span++] = (struct watch_span){session, t_ns, INT64_MAX};
 }
 
 /* Whether a fault leaves sessions open. The client may then end its own. */
@@ -171,11 +165,8 @@ static void power_is_back(struct watch *w)
 
 static void watch_spoil(struct watch *w, const struct fault_note *note)
 {
-    if (!grow(&w->spoiled, &w->room_spoiled, w->n_spoiled + 1, sizeof *w->spoiled)) {
-        w->is_short = 1;
-        return;
-    }
-    w->spoiled[w->n_spoiled++] = (struct watch_spoiled){note->session, note->seq};
+    w->is_short |= !grow(&w->spoiled, &w->room_spoiled, w->n_spoiled + 1, sizeof *w->spoiled);
+    if (!w->is_short) w->spoiled[w->n_spoiled++] = (struct watch_spoiled){note->session, note->seq};
 }
 
 void watch_note(void *ctx, const struct fault_note *note)

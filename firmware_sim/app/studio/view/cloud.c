@@ -12,11 +12,11 @@
 /* Removes shots without echo, and points that have no place; the others keep their order. */
 static void leave_out_empty(struct viewed *v)
 {
-    struct viewed_points *p = &v->points;
+    struct cloud *p = &v->points;
     uint32_t kept = 0;
     for (uint32_t i = 0; i < p->n; i++) {
         if (isnan(p->xyz_m[i][0])) continue;
-        if (!viewed_can_show(v->epsg, p->xyz_m[i])) {
+        if (!viewed_can_show(v->points.epsg, p->xyz_m[i])) {
             v->n_left_out++;
             continue;
         }
@@ -34,31 +34,13 @@ static void leave_out_empty(struct viewed *v)
     p->n = kept;
 }
 
-/* Moves the arrays from the cloud to the recording. */
-static void cloud_take(struct viewed *v, struct cloud *c)
-{
-    v->points = (struct viewed_points){.n = (uint32_t)c->n,
-                                       .xyz_m = c->xyz_m,
-                                       .range_m = c->range_m,
-                                       .reflectance_db = c->reflectance_db,
-                                       .amplitude_db = c->amplitude_db,
-                                       .t_s = c->time_s,
-                                       .label = c->label,
-                                       .station = c->station,
-                                       .echo = c->echo,
-                                       .echoes = c->echo_count,
-                                       .rgb = c->rgb};
-    v->epsg = c->epsg;
-    *c = (struct cloud){0};
-}
-
 /* Our recorder writes these comments into the header: "label N OBJECT | MATERIAL", "idn ...", "profile ...". */
 static int take_comment(struct viewed *v, char *line, struct sh_err *err)
 {
     unsigned label;
     int used = 0;
     line[strcspn(line, "\r\n")] = '\0';
-    if (sscanf(line, "label %u %n", &label, &used) == 1 && used > 0 && label < VIEWED_LABEL_NONE) {
+    if (sscanf(line, "label %u %n", &label, &used) == 1 && used > 0 && label < CLOUD_LABEL_NONE) {
         char *bar = strstr(line + used, " | ");
         if (bar != NULL) *bar = '\0';
         return viewed_add_surface(v, label, line + used, bar != NULL ? bar + 3 : "", err);
@@ -85,7 +67,7 @@ static int read_comments(struct viewed *v, struct sh_err *err)
 
 static int add_stations(struct viewed *v, struct sh_err *err)
 {
-    const struct viewed_points *p = &v->points;
+    const struct cloud *p = &v->points;
     uint8_t *seen = p->station != NULL ? calloc(UINT16_MAX + 1, 1) : NULL;
     int rc = SH_OK;
     if (p->station == NULL) return SH_OK;
@@ -101,15 +83,10 @@ static int add_stations(struct viewed *v, struct sh_err *err)
 int viewed_load_cloud(struct viewed *v, const struct sh_report *report, struct sh_err *err)
 {
     const unsigned all = CLOUD_TIME | CLOUD_RANGE | CLOUD_REFLECTANCE | CLOUD_ECHO_COUNT | CLOUD_RGB | CLOUD_AMPLITUDE;
-    struct cloud cloud;
-    int rc = cloud_read_columns(v->path, all, report, &cloud, err);
+    int rc = cloud_read_columns(v->path, all, report, &v->points, err);
     if (rc != SH_OK) return rc;
-    if (cloud.n > UINT32_MAX) {
-        const size_t n = cloud.n;
-        cloud_free(&cloud);
-        return sh_fail(err, SH_EINPUT, "%s: %zu points; at most %u can be shown", v->path, n, UINT32_MAX);
-    }
-    cloud_take(v, &cloud);
+    if (v->points.n > UINT32_MAX)
+        return sh_fail(err, SH_EINPUT, "%s: %zu points; at most %u can be shown", v->path, v->points.n, UINT32_MAX);
     leave_out_empty(v);
     if (strcmp(v->format, "ply") == 0) rc = read_comments(v, err);
     snprintf(v->why_no_mesh, sizeof v->why_no_mesh,

@@ -57,7 +57,7 @@ static void put_words(char *to, const uint32_t words[7])
 
 /* The points of an answer. */
 struct slice {
-    const struct viewed_points *points;
+    const struct cloud *points;
     const double *origin_m;
     double t0_s;
     uint32_t first, every, n;
@@ -84,7 +84,7 @@ static void put_column(const struct slice *s, enum viewed_column column, char *t
         float f;
         uint16_t u;
         if (column == VIEWED_T) {
-            le_put_float(to + i * size, (float)(s->points->t_s[at] - s->t0_s));
+            le_put_float(to + i * size, (float)(s->points->time_s[at] - s->t0_s));
         } else if (c->type == VIEW_FLOAT32) {
             memcpy(&f, from, sizeof f);
             le_put_float(to + i * size, f);
@@ -127,10 +127,10 @@ static size_t lay_out(const struct slice *s, uint32_t n_columns, char *body)
     return at;
 }
 
-int view_encode_points(const struct viewed_points *points, const double origin_m[3], double t0_s,
-                       const struct view_part *part, struct web_body *body, struct sh_err *err)
+int view_encode_points(const struct cloud *points, const double origin_m[3], double t0_s, const struct view_part *part,
+                       struct web_body *body, struct sh_err *err)
 {
-    const uint32_t n = count_of(points->n, part->first, part->every, part->most, VIEW_MAX_POINTS);
+    const uint32_t all = (uint32_t)points->n, n = count_of(all, part->first, part->every, part->most, VIEW_MAX_POINTS);
     const struct slice s = {points, origin_m, t0_s, part->first, part->every, n};
     uint32_t n_columns = 1;
     size_t size;
@@ -140,7 +140,7 @@ int view_encode_points(const struct viewed_points *points, const double origin_m
     char *to = calloc(1, len);
     if (to == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %u points", s.n);
     memcpy(to, "SHCL", 4);
-    const uint32_t head[] = {1, s.n, n_columns, part->first, part->every, points->n, 0};
+    const uint32_t head[] = {1, s.n, n_columns, part->first, part->every, all, 0};
     put_words(to + 4, head);
     for (int k = 0; k < 3; k++)
         le_put_double(to + 32 + 8 * k, origin_m[k]);

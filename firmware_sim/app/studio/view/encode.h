@@ -36,8 +36,8 @@ struct view_part {
     uint32_t first, every, most;
 };
 /* Positions are relative to origin_m, times to t0_s. SH_ENOMEM. */
-int view_encode_points(const struct viewed_points *points, const double origin_m[3], double t0_s,
-                       const struct view_part *part, struct web_body *body, struct sh_err *err);
+int view_encode_points(const struct cloud *points, const double origin_m[3], double t0_s, const struct view_part *part,
+                       struct web_body *body, struct sh_err *err);
 /* Encodes up to `most` triangles of a mesh from number `first` on, in the order of their edge ratio (viewed.h), the
  * smallest first. SH_ENOMEM. */
 int view_encode_mesh(const struct viewed_mesh *mesh, uint32_t first, uint32_t most, struct web_body *body,

@@ -10,9 +10,10 @@
 
 static void put_frame(const struct viewed *v, struct json *json)
 {
+    const int64_t code = v->points.epsg;
     char epsg[32];
-    snprintf(epsg, sizeof epsg, "EPSG:%lld", (long long)v->epsg);
-    json_string(json, "frame", v->turned ? "enu" : v->epsg == 0 ? "scene" : v->epsg > 0 ? epsg : "unknown");
+    snprintf(epsg, sizeof epsg, "EPSG:%lld", (long long)code);
+    json_string(json, "frame", v->turned ? "enu" : code == 0 ? "scene" : code > 0 ? epsg : "unknown");
     json_string(json, "crs", v->turned ? epsg : NULL);
     if (!v->turned) {
         json_string(json, "place", NULL);

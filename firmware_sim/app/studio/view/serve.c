@@ -2,7 +2,6 @@
 #include "firmware_sim/app/studio/view/serve.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "firmware_sim/app/studio/page_json.h"
@@ -60,7 +59,7 @@ static int make_sparse(struct view_serve *s, const struct view_spread *wish, str
     if (s->made && last->per_m2 == wish->per_m2 && last->long_edge == wish->long_edge && last->seed == wish->seed &&
         last->scan == wish->scan)
         return SH_OK;
-    viewed_points_free(&s->sparse);
+    cloud_free(&s->sparse);
     s->made = 0;
     int rc = view_spread(s->viewed, wish, s->report, &s->sparse, err);
     if (rc != SH_OK) return rc;
@@ -99,6 +98,6 @@ int view_serve_get(void *ctx, const char *path, const char *query, struct web_bo
 
 void view_serve_free(struct view_serve *s)
 {
-    viewed_points_free(&s->sparse);
+    cloud_free(&s->sparse);
     s->made = 0;
 }

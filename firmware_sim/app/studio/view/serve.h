@@ -12,7 +12,7 @@ struct view_serve {
     const struct viewed *viewed;
     const struct sh_report *report; /* its stop ends long computations; may be NULL */
     /* the last sparse points that were made, and by which request */
-    struct viewed_points sparse;
+    struct cloud sparse;
     int made;
     struct view_spread wish;
 };

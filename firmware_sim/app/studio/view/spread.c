@@ -17,13 +17,13 @@ static uint32_t keep_faces(const struct viewed_mesh *m, double long_edge, uint32
     return n;
 }
 
-static int append(struct viewed_points *out, const struct mesh_points *from, int coloured, struct sh_err *err)
+static int append(struct cloud *out, const struct mesh_points *from, int coloured, struct sh_err *err)
 {
     const unsigned has = 1u << VIEWED_RANGE | 1u << VIEWED_REFLECTANCE | 1u << VIEWED_LABEL | 1u << VIEWED_STATION |
                          (coloured ? 1u << VIEWED_RGB : 0);
-    int rc = viewed_points_room(out, (size_t)out->n + from->n, has, err);
+    int rc = viewed_points_room(out, out->n + from->n, has, err);
     for (uint32_t i = 0; rc == SH_OK && i < from->n; i++) {
-        const uint32_t n = out->n++;
+        const size_t n = out->n++;
         memcpy(out->xyz_m[n], from->xyz_m[i], sizeof out->xyz_m[n]);
         out->range_m[n] = (float)from->range_m[i];
         out->reflectance_db[n] = from->reflectance_db[i];
@@ -37,7 +37,7 @@ static int append(struct viewed_points *out, const struct mesh_points *from, int
 /* Returns the recording's arrays from the mesh's first point on. range_m gets the ranges in double. */
 static struct mesh_points points_of(const struct viewed *v, const struct viewed_mesh *m, double *range_m)
 {
-    const struct viewed_points *p = &v->points;
+    const struct cloud *p = &v->points;
     for (uint32_t i = 0; i < m->n_points; i++)
         range_m[i] = (double)p->range_m[m->first_point + i];
     return (struct mesh_points){.n = m->n_points,
@@ -68,7 +68,7 @@ struct spread {
     const struct viewed *viewed;
     const struct view_spread *wish;
     const struct sh_report *report;
-    struct viewed_points *out;
+    struct cloud *out;
     double sum_m2; /* of all so far */
 };
 
@@ -97,7 +97,7 @@ static int spread_one(struct spread *s, const struct viewed_mesh *m, struct sh_e
 }
 
 int view_spread(const struct viewed *v, const struct view_spread *wish, const struct sh_report *report,
-                struct viewed_points *out, struct sh_err *err)
+                struct cloud *out, struct sh_err *err)
 {
     struct spread s = {v, wish, report, out, 0};
     int rc = SH_OK;

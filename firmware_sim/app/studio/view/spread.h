@@ -12,8 +12,8 @@ struct view_spread {
 };
 
 /* SH_EINPUT where there would be more than VIEW_MAX_SPARSE points, with the density that is possible. SH_ENOMEM,
- * SH_ESTOPPED. viewed_points_free is due in any case. */
+ * SH_ESTOPPED. cloud_free is due in any case. */
 int view_spread(const struct viewed *viewed, const struct view_spread *wish, const struct sh_report *report,
-                struct viewed_points *out, struct sh_err *err);
+                struct cloud *out, struct sh_err *err);
 
 #endif

@@ -58,7 +58,7 @@ static int begin_scan(void *ctx, struct sh_err *err)
     s->no_mesh = !check_mesh(s);
     snprintf(s->v->idn, sizeof s->v->idn, "%s", t->info.idn);
     snprintf(s->v->profile, sizeof s->v->profile, "%s", t->info.profile);
-    s->v->epsg = t->epsg;
+    s->v->points.epsg = t->epsg;
     mesh_grid_begin(&s->grid, t, 0);
     return place_station(s, err);
 }
@@ -67,7 +67,7 @@ static int begin_scan(void *ctx, struct sh_err *err)
 
 static int stream_make_room(struct viewed_stream *s, struct sh_err *err)
 {
-    struct viewed_points *p = &s->v->points;
+    struct cloud *p = &s->v->points;
     if (p->n < s->room) return SH_OK;
     if (p->n == UINT32_MAX)
         return sh_fail(err, SH_EINPUT, "%s: at most %u points can be shown", s->v->path, UINT32_MAX);
@@ -88,16 +88,16 @@ static void put_point(struct viewed_stream *s, int i, const double xyz_m[3])
 {
     const struct track *t = &s->track;
     const struct track_points *from = &t->points;
-    struct viewed_points *p = &s->v->points;
-    const uint32_t n = p->n++;
+    struct cloud *p = &s->v->points;
+    const size_t n = p->n++;
     memcpy(p->xyz_m[n], xyz_m, sizeof p->xyz_m[n]);
     p->range_m[n] = (float)from->range_m[i];
     p->reflectance_db[n] = (float)from->reflectance_db[i];
-    p->t_s[n] = 1e-9 * (double)from->t_ns[i];
+    p->time_s[n] = 1e-9 * (double)from->t_ns[i];
     p->label[n] = from->label[i];
     p->station[n] = (uint16_t)t->info.station;
     p->echo[n] = from->echo[i];
-    p->echoes[n] = from->echo_count[i];
+    p->echo_count[n] = from->echo_count[i];
     if (p->amplitude_db != NULL) p->amplitude_db[n] = (float)t->attribute[i].amplitude_db;
     if (p->rgb != NULL) memcpy(p->rgb[n], t->rgb[i], sizeof p->rgb[n]);
 }
@@ -114,7 +114,7 @@ static int put_into_grid(struct viewed_stream *s, int i, const double xyz_m[3], 
     }
     if (!grow(&s->at, &s->room_at, (size_t)s->grid.n + 1, sizeof *s->at))
         return sh_fail(err, SH_ENOMEM, "%s: no memory for a grid of %u points", s->v->path, s->grid.n);
-    s->at[s->grid.n] = s->v->points.n - 1;
+    s->at[s->grid.n] = (uint32_t)s->v->points.n - 1;
     int is_in = mesh_grid_add(&s->grid, t, i, xyz_m, err);
     return is_in < 0 ? is_in : SH_OK;
 }

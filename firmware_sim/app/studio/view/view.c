@@ -55,7 +55,7 @@ static void say_what_is_shown(const struct viewed *v)
     uint64_t faces = 0;
     for (size_t i = 0; i < v->n_meshes; i++)
         faces += v->mesh[i].n_faces;
-    fprintf(stderr, "scanhead: %s: %u points, %llu shots without echo, %llu triangles in %zu mesh%s\n", v->path,
+    fprintf(stderr, "scanhead: %s: %zu points, %llu shots without echo, %llu triangles in %zu mesh%s\n", v->path,
             v->points.n, (unsigned long long)v->n_empty, (unsigned long long)faces, v->n_meshes,
             v->n_meshes == 1 ? "" : "es");
 }

@@ -86,10 +86,10 @@ static void turn_station(const struct geoframe *frame, struct viewed_station *s)
 static int turn_to_enu(struct viewed *v, struct sh_err *err)
 {
     static const double zero[3] = {0, 0, 0};
-    const int is_geodetic = v->epsg == EPSG_GEODETIC;
+    const int is_geodetic = v->points.epsg == EPSG_GEODETIC;
     struct geoframe frame;
     struct georef_place at;
-    if ((!is_geodetic && v->epsg != EPSG_ECEF) || v->points.n == 0) return SH_OK;
+    if ((!is_geodetic && v->points.epsg != EPSG_ECEF) || v->points.n == 0) return SH_OK;
     const double *first = v->points.xyz_m[0];
     struct sh_err why = {0};
     int rc = SH_OK;
@@ -114,7 +114,7 @@ static int turn_to_enu(struct viewed *v, struct sh_err *err)
 /* ---- figures */
 
 /* Value i of a column that has one number a point. */
-static double value_of(const struct viewed_points *p, enum viewed_column column, uint32_t i)
+static double value_of(const struct cloud *p, enum viewed_column column, uint32_t i)
 {
     switch (column) {
     case VIEWED_RANGE:
@@ -124,15 +124,15 @@ static double value_of(const struct viewed_points *p, enum viewed_column column,
     case VIEWED_AMPLITUDE:
         return (double)p->amplitude_db[i];
     case VIEWED_T:
-        return p->t_s[i];
+        return p->time_s[i];
     case VIEWED_LABEL:
-        return p->label[i] != VIEWED_LABEL_NONE ? p->label[i] : (double)NAN;
+        return p->label[i] != CLOUD_LABEL_NONE ? p->label[i] : (double)NAN;
     case VIEWED_STATION:
         return p->station[i];
     case VIEWED_ECHO:
         return p->echo[i];
     case VIEWED_ECHOES:
-        return p->echoes[i];
+        return p->echo_count[i];
     default:
         return (double)NAN;
     }
@@ -192,7 +192,7 @@ struct viewed_station *viewed_add_station(struct viewed *v, uint32_t number, str
 int viewed_load(struct viewed *v, const char *path, const struct sh_report *report, struct sh_err *err)
 {
     char head[4];
-    *v = (struct viewed){.path = path, .complete = 1, .epsg = -1};
+    *v = (struct viewed){.path = path, .complete = 1, .points.epsg = CLOUD_EPSG_UNKNOWN};
     int rc = viewed_check_ending(path, err);
     if (rc == SH_OK) rc = look_at(path, head, err);
     if (rc != SH_OK) return rc;
@@ -212,7 +212,7 @@ int viewed_load(struct viewed *v, const char *path, const struct sh_report *repo
 
 void viewed_free(struct viewed *v)
 {
-    viewed_points_free(&v->points);
+    cloud_free(&v->points);
     for (size_t i = 0; i < v->n_meshes; i++) {
         free(v->mesh[i].face);
         free(v->mesh[i].ratio);

@@ -12,6 +12,7 @@
 #include <stdint.h>
 
 #include "core/err.h"
+#include "core/studio/cloud.h"
 
 /* Columns beside the position. */
 enum viewed_column {
@@ -27,25 +28,11 @@ enum viewed_column {
     VIEWED_COLUMNS
 };
 
-enum { VIEWED_LABEL_NONE = 0xffff };
-
-/* Each array but xyz_m is NULL where the file has no such column. */
-struct viewed_points {
-    uint32_t n;
-    double (*xyz_m)[3];                             /* [n] */
-    float *range_m, *reflectance_db, *amplitude_db; /* [n] NaN: this point has none */
-    double *t_s;                                    /* [n] as the file counts it */
-    uint16_t *label, *station;                      /* [n] label: VIEWED_LABEL_NONE where unknown; station: from 1 */
-    uint8_t *echo, *echoes;                         /* [n] */
-    uint8_t (*rgb)[3];                              /* [n] */
-};
-
 /* The array of a column, or NULL; *size: bytes of one value, its components together. */
-const void *viewed_array(const struct viewed_points *points, enum viewed_column column, size_t *size);
+const void *viewed_array(const struct cloud *points, enum viewed_column column, size_t *size);
 /* Makes room for n points in xyz_m and in the columns of `has` (bit c: column c). The array of a column is NULL until
  * the first call that names the column. SH_ENOMEM: the points are unchanged; some arrays may have the new room. */
-int viewed_points_room(struct viewed_points *points, size_t n, unsigned has, struct sh_err *err);
-void viewed_points_free(struct viewed_points *points);
+int viewed_points_room(struct cloud *points, size_t n, unsigned has, struct sh_err *err);
 
 struct viewed_mesh {
     uint32_t station, scan, sweep;  /* scan: its number in the stream; sweep: its pan sweep */
@@ -71,11 +58,10 @@ struct viewed_surface {
 
 struct viewed {
     const char *path;
-    const char *format; /* "shs" (also of a .pcapng), "ply", "las" */
-    struct viewed_points points;
+    const char *format;           /* "shs" (also of a .pcapng), "ply", "las" */
+    struct cloud points;          /* up to UINT32_MAX, without shots that have no echo; its epsg is that of the file */
     uint64_t n_empty, n_left_out; /* shots without echo; echoes that could not be placed */
     int complete;                 /* .shs, .pcapng: nothing is missing, as far as the stream says; else 1 */
-    int64_t epsg;                 /* of the file; 0: scene frame; -1: not known */
     int turned;                   /* 1: points were turned to east, north, up of this place: */
     double lat_deg, lon_deg, height_m;
     struct viewed_mesh *mesh;

@@ -15,7 +15,9 @@
 #include <unistd.h>
 
 #include "core/bytes.h"
+#include "core/text.h"
 #include "drivers/protocol/native_encode.h"
+#include "firmware_sim/app/app.h"
 #include "firmware_sim/app/studio/page_json.h"
 #include "firmware_sim/app/studio/page_query.h"
 #include "firmware_sim/app/studio/record/job.h"
@@ -46,23 +48,6 @@ struct save {
 };
 
 /* ---- the file */
-
-static int make_folder(struct save *s, struct sh_err *err)
-{
-    const char *temporary = getenv("TMPDIR");
-    if (s->folder[0] != '\0' && access(s->folder, W_OK) == 0) return SH_OK; /* else a service may have removed it */
-    if (temporary == NULL || temporary[0] == '\0') temporary = "/tmp";
-    const int n = snprintf(s->folder, sizeof s->folder, "%s/scanhead-save-XXXXXX", temporary);
-    if (n >= (int)sizeof s->folder) {
-        s->folder[0] = '\0';
-        return sh_fail(err, SH_EIO, "TMPDIR has %zu bytes; allowed are up to %zu: %.100s...", strlen(temporary),
-                       sizeof s->folder - sizeof "/scanhead-save-XXXXXX", temporary);
-    }
-    if (mkdtemp(s->folder) != NULL) return SH_OK;
-    const int rc = sh_fail(err, SH_EIO, "%s: %s", s->folder, strerror(errno));
-    s->folder[0] = '\0';
-    return rc;
-}
 
 static int save_ends(void *self)
 {
@@ -252,16 +237,15 @@ static void put_state(struct json *json, const void *ctx)
 /* Allows the formats of points that need no second file. */
 static int check_as(const char *as, struct sh_err *err)
 {
-    static const char *const all[] = {"las", "ply", "e57", "ptx", "pcapng"};
-    for (size_t i = 0; i < sizeof all / sizeof *all; i++)
-        if (strcmp(as, all[i]) == 0) return SH_OK;
+    static const char *const all[] = {"las", "ply", "e57", "ptx", "pcapng", NULL};
+    if (text_is_one_of((struct text_span){as, strlen(as)}, all)) return SH_OK;
     return sh_fail(err, SH_EINPUT, "as=%.32s: allowed are las, ply, e57, ptx, pcapng", as);
 }
 
 static int begin_thread(struct save *s, const char *as, struct sh_err *err)
 {
-    const int rc = make_folder(s, err);
-    if (rc != SH_OK) return rc;
+    const int is_there = s->folder[0] != '\0' && access(s->folder, W_OK) == 0; /* else a service may have removed it */
+    if (!is_there && app_make_folder("save", s->folder, sizeof s->folder, err) != SH_OK) return SH_EIO;
     s->number++;
     snprintf(s->as, sizeof s->as, "%s", as);
     snprintf(s->stream, sizeof s->stream, "%s/stream.shs", s->folder);
