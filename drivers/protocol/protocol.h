@@ -192,7 +192,7 @@ struct protocol_ops {
     size_t size; /* of the protocol's own struct, which has a struct protocol_spec as its first member */
     /* Sets up an instance, which is all 0 but for the spec. When it fails, nothing of it stays. May be NULL. */
     int (*begin)(void *protocol, struct sh_err *err);
-    /* Frees what the instance holds, but not the instance itself. May be NULL. */
+    /* Frees what the instance holds, but not the instance itself. `protocol` may be NULL, as may this function. */
     void (*end)(void *protocol);
 
     /* The client is there. t_ns: device time of the tick from which on the client gets frames. May be NULL. */
@@ -217,7 +217,8 @@ struct protocol_ops {
     /* The client has gone. Something that it asked for may still be due, such as a reboot. May be NULL. */
     void (*gone)(void *protocol);
     /* Device time that must have passed before time() has something to do, unless frames or bytes come. May be NULL:
-     * each tick, or where there is no time(), never. next_ns saves wake-ups, no more: time() is called for the other ticks, too. */
+     * each tick, or where there is no time(), never. next_ns saves wake-ups, no more: time() is called for the other
+     * ticks, too. */
     int64_t (*next_ns)(const void *protocol);
 };
 

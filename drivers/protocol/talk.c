@@ -43,7 +43,8 @@ static int capture_begin(void *protocol, struct sh_err *err)
 
 static void capture_end(void *protocol)
 {
-    free(((struct capture_session *)protocol)->times);
+    struct capture_session *s = protocol;
+    if (s != NULL) free(s->times);
 }
 
 /* ---- runs */

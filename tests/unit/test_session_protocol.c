@@ -210,6 +210,14 @@ static void it_wakes_for_its_protocol(void **state)
     assert_int_equal(session_wake_tick(&pump, s), 9);
     does.next_ns = -1;
     assert_int_equal(session_wake_tick(&pump, s), 5);
+    const struct protocol_ops *const all = pump.protocol;
+    struct protocol_ops some = *all;
+    pump.protocol = &some;
+    some.next_ns = NULL;
+    assert_int_equal(session_wake_tick(&pump, s), 5);
+    some.time = NULL; /* without frames it has nothing to do */
+    assert_true(session_wake_tick(&pump, s) == UINT64_MAX);
+    pump.protocol = all;
 }
 
 /* A link that fails ends the session. A client that went away is no failure of the link. */
