@@ -10,19 +10,25 @@
 
 /* ---- which device it can be */
 
+/* All three are 0 where no place is configured (drivers/protocol/ANCHOR.md). A latitude of 0 alone is on the equator. */
+static int stands_on_earth(const struct native_anchor *a)
+{
+    return (a->moving & NATIVE_MOVING) == 0 && (a->lat_deg != 0.0 || a->lon_deg != 0.0 || a->height_m != 0.0);
+}
+
 /* Checks that the stream has all that the protocol needs, except for the emitter. NULL: nothing is missing; else a text
  * says what is. Amplitudes may be missing: protocols then use reflectances. */
 static const char *lacks(const struct replay *r, const struct protocol_ops *ops, const struct native_descriptor *d,
                          const struct native_emitter *e)
 {
-    const int first = e != NULL && e->echoes == NATIVE_ECHOES_FIRST, stands = (r->anchor.moving & NATIVE_MOVING) == 0;
+    const int first = e != NULL && e->echoes == NATIVE_ECHOES_FIRST;
     if ((ops->needs & PROTOCOL_NEEDS_POLAR) != 0 && d->layout != NATIVE_POLAR)
         return "has positions instead of ranges (layout geo); required is layout polar";
     if ((ops->needs & PROTOCOL_NEEDS_LAST) != 0 && first)
         return "has first echoes alone; required is all, last or strongest";
     if ((ops->needs & PROTOCOL_NEEDS_TIME) != 0 && r->utc0_ns == INT64_MIN)
         return "has no time of day; required is a recording of a head with time.epoch";
-    if ((ops->needs & PROTOCOL_NEEDS_PLACE) != 0 && (!stands || r->anchor.lat_deg == 0.0))
+    if ((ops->needs & PROTOCOL_NEEDS_PLACE) != 0 && !stands_on_earth(&r->anchor))
         return "has no place on the Earth where it stands; required is a station with one";
     return NULL;
 }
@@ -121,7 +127,6 @@ int replay_fix(void *self, int64_t t_ns, struct nmea_fix *fix)
     pthread_mutex_lock(&r->lock);
     const struct native_anchor a = r->anchor;
     pthread_mutex_unlock(&r->lock);
-    const int found = a.lat_deg != 0.0 && (a.moving & NATIVE_MOVING) == 0;
     *fix = (struct nmea_fix){.talker = {'G', 'N'},
                              .year = utc.year,
                              .month = utc.month,
@@ -129,7 +134,7 @@ int replay_fix(void *self, int64_t t_ns, struct nmea_fix *fix)
                              .hour = utc.hour,
                              .minute = utc.minute,
                              .second = utc.second,
-                             .quality = found,
+                             .quality = stands_on_earth(&a),
                              .satellites = 12,
                              .hdop = 0.7,
                              .lat_deg = a.lat_deg,
