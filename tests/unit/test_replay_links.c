@@ -36,7 +36,7 @@ static void expect_answer(const struct recorded *row, size_t i)
     r->cfg = cfg;
     r->options.path = "a.shs";
     r->options.speed = row->speed;
-    r->utc0_ns = row->utc0_ns;
+    replay_clock_begin(&r->clock, 0, row->utc0_ns);
     r->anchor.lat_deg = row->lat_deg;
     r->anchor.lon_deg = row->lon_deg;
     r->anchor.height_m = row->height_m;
@@ -101,7 +101,7 @@ static struct replay *replay_with(int64_t utc0_ns, double lat_deg)
     struct replay *r = calloc(1, sizeof *r);
     assert_non_null(r);
     pthread_mutex_init(&r->lock, NULL);
-    r->utc0_ns = utc0_ns;
+    replay_clock_begin(&r->clock, 0, utc0_ns);
     r->anchor.lat_deg = lat_deg;
     r->anchor.lon_deg = 8.5;
     r->anchor.height_m = 110.0;
@@ -152,13 +152,13 @@ static void dates_are_within_what_a_calendar_has(void **state)
 {
     (void)state;
     static const int64_t LAST_NS = INT64_C(7258118400) * SECOND_NS;
-    struct replay *r = replay_with(0, 49.0);
+    struct replay *r = replay_with(2, 49.0);
     struct nmea_fix fix;
     int64_t hour_ns;
-    assert_int_equal(replay_pps(r, 0, &hour_ns), PROTOCOL_PPS_ABSENT);
-    assert_int_equal(replay_pps(r, 1, &hour_ns), PROTOCOL_PPS_LOCKED);
+    assert_int_equal(replay_pps(r, -2, &hour_ns), PROTOCOL_PPS_ABSENT);
+    assert_int_equal(replay_pps(r, -1, &hour_ns), PROTOCOL_PPS_LOCKED);
     assert_int_equal(hour_ns, 1);
-    r->utc0_ns = LAST_NS - 5;
+    replay_clock_begin(&r->clock, 0, LAST_NS - 5);
     assert_int_equal(replay_date_ns(r, 4), LAST_NS - 1);
     assert_int_equal(replay_fix(r, 4, &fix), 1);
     assert_true(fix.year == 2199 && fix.month == 12 && fix.day == 31);
