@@ -234,8 +234,11 @@ int session_restart_protocol(struct pump *pump, struct session *s)
 {
     session_close_protocol(pump, s);
     struct sh_err err; /* not used: session_restart reports the failure */
+    const struct loop_source *source = pump->links->source;
+    const int64_t power_ns = source->ops->last_power(source->self).t_ns, now_ns = time_of(pump, s->cursor);
     const int rc = pump_protocol_create(pump, s, &err);
-    if (rc == SH_OK) pump->protocol->open(s->protocol, time_of(pump, s->cursor));
+    /* A head without power sends nothing by itself, so the protocol begins when power comes. */
+    if (rc == SH_OK) pump->protocol->open(s->protocol, power_ns > now_ns ? power_ns : now_ns);
     return rc;
 }
 
