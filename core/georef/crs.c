@@ -6,6 +6,7 @@
 
 #include "core/angle.h"
 #include "core/georef/proj_lib.h"
+#include "core/vec3.h"
 
 /* A coordinate reference system that PROJ knows: the part of it that is used here. */
 struct grid {
@@ -89,17 +90,26 @@ static PJ_COORD transformed(const struct grid *grid, double easting_m, double no
     return grid->lib.proj_trans(grid->to, PJ_FWD, in);
 }
 
+static void transformed_to_ecef(const struct grid *grid, double easting_m, double northing_m, double p_ecef[3])
+{
+    const PJ_COORD at = transformed(grid, easting_m, northing_m);
+    georef_geodetic_to_ecef(&(struct georef_place){at.xy.y, at.xy.x, 0.0}, p_ecef);
+}
+
 /* Measures convergence and scale by differences over 100 m each way. The error of these differences is of the third
- * order, below 1e-9 in any survey grid. */
+ * order, below 1e-9 in any survey grid. They are taken in space, since near a pole degrees change faster than the
+ * grid. At the pole itself, north is that of the longitude in `at`. */
 static void measure_grid(const struct grid *grid, double easting_m, double northing_m, const PJ_COORD *at,
                          struct crs_place *place)
 {
-    static const double step_m = 100.0, a_m = 6378137.0, e2 = 0.00669437999014;
-    const PJ_COORD south = transformed(grid, easting_m, northing_m - step_m);
-    const PJ_COORD north = transformed(grid, easting_m, northing_m + step_m);
-    const double lat = angle_rad(at->xy.y), w = sqrt(1.0 - e2 * sin(lat) * sin(lat));
-    const double east_m = angle_rad(remainder(north.xy.x - south.xy.x, 360.0)) * a_m / w * cos(lat);
-    const double north_m = angle_rad(north.xy.y - south.xy.y) * a_m * (1.0 - e2) / (w * w * w);
+    static const double step_m = 100.0;
+    double south[3], north[3], d[3];
+    transformed_to_ecef(grid, easting_m, northing_m - step_m, south);
+    transformed_to_ecef(grid, easting_m, northing_m + step_m, north);
+    vec3_sub(north, south, d);
+    const double lat = angle_rad(at->xy.y), lon = angle_rad(at->xy.x);
+    const double east_m = cos(lon) * d[1] - sin(lon) * d[0];
+    const double north_m = cos(lat) * d[2] - sin(lat) * (cos(lon) * d[0] + sin(lon) * d[1]);
     place->convergence_rad = atan2(east_m, north_m);
     place->scale = 2.0 * step_m / hypot(east_m, north_m);
 }

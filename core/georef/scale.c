@@ -45,17 +45,29 @@ static void spans(const struct georef *georef, double reach_m, double span[3], d
     if (reach_m > 1e6) span[0] = 180.0;
 }
 
+static int is_longitude(const struct georef *georef, int i)
+{
+    return georef_has_map(georef) && georef->crs == GEOREF_GEODETIC && i == 1;
+}
+
+double georef_span_m(const struct georef *georef, double reach_m)
+{
+    double span[3], unit[3], most_m = 0.0;
+    spans(georef, reach_m, span, unit);
+    for (int i = 0; i < 3; i++)
+        if (!is_longitude(georef, i)) most_m = fmax(most_m, span[i] / unit[i]);
+    return most_m;
+}
+
 int georef_scale(const struct georef *georef, double scale_m, double reach_m, double scale[3], struct sh_err *err)
 {
-    double span[3], unit[3], least_m = 0.0;
-    int degrees = georef_has_map(georef) && georef->crs == GEOREF_GEODETIC;
+    double span[3], unit[3];
+    const double least_m = georef_span_m(georef, reach_m) / MOST_COUNTS;
     spans(georef, reach_m, span, unit);
     for (int i = 0; i < 3; i++) {
         scale[i] = scale_m * unit[i];
-        if (degrees && i == 1) /* a full turn has to fit, however short that is on the ground */
-            scale[i] = fmax(scale[i], span[i] / MOST_COUNTS);
-        else
-            least_m = fmax(least_m, span[i] / unit[i] / MOST_COUNTS);
+        /* a full turn has to fit, however short that is on the ground */
+        if (is_longitude(georef, i)) scale[i] = fmax(scale[i], span[i] / MOST_COUNTS);
     }
     if (least_m <= scale_m) return SH_OK; /* false for NaN */
     return sh_fail(

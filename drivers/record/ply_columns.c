@@ -113,9 +113,10 @@ static void put_comments(FILE *out, const struct ply_facts *facts)
             t->begun && t->crs == NATIVE_CRS_GEODETIC ? "x latitude, y longitude in degrees, z range in metres"
                                                       : "x y z range in metres");
     if (facts->have_gps) {
-        double week = floor(facts->gps_s / WEEK_S);
+        /* Rounded before it is split, so that no week ends with the second 604800.000000. */
+        const double us = round(facts->gps_s * 1e6), week = floor(us / (WEEK_S * 1e6));
         fprintf(out, "comment the first scan starts at GPS week %.0f second %.6f\n", week,
-                facts->gps_s - week * WEEK_S);
+                1e-6 * (us - week * (WEEK_S * 1e6)));
     }
     if ((facts->columns & PLY_REFLECTANCE) != 0) fputs("comment reflectance in dB, nan: not modelled\n", out);
     if ((facts->columns & PLY_ATTRIBUTES) != 0)

@@ -166,8 +166,9 @@ static int reply_time_of_day(struct command_call *call, const char *text, const 
 {
     if (text[0] == '\0')
         return command_fail(call, CMD_E_SETTINGS, "%s? %s", call->row->header,
-                            call->dev->recorded != NULL ? "is not possible: the recording does not have this value"
-                                                        : needs);
+                            call->dev->recorded != NULL
+                                ? "is not answered in a replay; telemetry has the value, if the recorded head had it"
+                                : needs);
     return command_reply(call, "%s", text);
 }
 

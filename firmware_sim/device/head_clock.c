@@ -124,7 +124,9 @@ int64_t head_clock_ns(const struct head_clock *clock, int64_t t_ns)
 
 int head_clock_add_leap(struct head_clock *clock, int64_t t_ns, int64_t *posix_s)
 {
-    const int64_t now_s = utc_posix_from_tai(&clock->table, head_clock_ns(clock, t_ns)) / UTC_SECOND_NS;
+    const int64_t head_ns = head_clock_ns(clock, t_ns), true_ns = head_clock_true_ns(clock, t_ns);
+    const int64_t tai_ns = head_ns > true_ns ? head_ns : true_ns;
+    const int64_t now_s = utc_posix_from_tai(&clock->table, tai_ns) / UTC_SECOND_NS;
     *posix_s = now_s - now_s % 60 + 60;
     for (uint32_t i = 0; i < clock->table.n; i++)
         if (clock->table.leap[i].posix_s == *posix_s) *posix_s += 60;

@@ -187,6 +187,15 @@ int64_t device_next_fix_ns(void *self, int64_t t_ns)
     return next_ns;
 }
 
+/* Whether the head had power when a sentence arrived, and has had it since then up to t_ns. It remembers nothing over a
+ * power cycle, and has no receiver while power is off. Only the last power cycle matters: sessions lag by less. */
+static int is_received(const struct device *device, int64_t arrived_ns, int64_t t_ns)
+{
+    const int64_t off_ns = (int64_t)device->power.off_tick * device->tick_ns;
+    const int64_t on_ns = (int64_t)device->power.on_tick * device->tick_ns;
+    return device->power.on_tick == 0 || t_ns < off_ns || arrived_ns >= on_ns;
+}
+
 /* Finds the head's poses around a time. 0: the head stands, or it has no pose. Just before the time a live platform may
  * have none yet. Just after it there may be one that is out of reach. */
 static int take_track(struct device *device, int64_t t_ns, struct gnss_track *track)
@@ -204,7 +213,8 @@ int device_fix(void *self, int64_t t_ns, struct nmea_fix *fix)
     struct device *device = self;
     struct receiver_sentence sentence;
     pthread_mutex_lock(&device->lock);
-    const int found = receiver_line_last(&device->line, &device->gnss, t_ns, &sentence);
+    const int found =
+        receiver_line_last(&device->line, &device->gnss, t_ns, &sentence) && is_received(device, sentence.t_ns, t_ns);
     pthread_mutex_unlock(&device->lock);
     if (!found) return 0;
     struct gnss_track track;

@@ -155,9 +155,9 @@ static void look_back(const struct pump *pump, struct session *s)
     if (from < s->cursor) s->cursor = from;
 }
 
-static void open_at_cursor(const struct pump *pump, const struct session *s)
+static void open_at(const struct pump *pump, const struct session *s, int64_t t_ns)
 {
-    if (pump->protocol->open != NULL) pump->protocol->open(s->protocol, time_of(pump, s->cursor));
+    if (pump->protocol->open != NULL) pump->protocol->open(s->protocol, t_ns);
 }
 
 /* Gives the protocol the descriptor, emitter and anchor from before the tick at the cursor. */
@@ -171,7 +171,7 @@ static void greet(struct pump *pump, struct session *s)
         len = latched_copy(&pump->stream->latched, frames, &version);
     } while (version != before);
     look_back(pump, s);
-    open_at_cursor(pump, s);
+    open_at(pump, s, time_of(pump, s->cursor));
     give_frames(pump->protocol, s, frames, len);
 }
 
@@ -240,8 +240,11 @@ int session_restart_protocol(struct pump *pump, struct session *s)
 {
     session_close_protocol(pump, s);
     struct sh_err err; /* not used: session_restart reports the failure */
+    const struct loop_source *source = pump->links->source;
+    const int64_t power_ns = source->ops->last_power(source->self).t_ns, now_ns = time_of(pump, s->cursor);
     const int rc = pump_protocol_create(pump, s, &err);
-    if (rc == SH_OK) open_at_cursor(pump, s);
+    /* A head without power sends nothing by itself, so the protocol begins when power comes. */
+    if (rc == SH_OK) open_at(pump, s, power_ns > now_ns ? power_ns : now_ns);
     return rc;
 }
 

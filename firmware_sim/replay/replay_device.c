@@ -10,19 +10,25 @@
 
 /* ---- which device it can be */
 
+/* All three are 0 where no place is configured (drivers/protocol/ANCHOR.md). A latitude of 0 alone is on the equator. */
+static int stands_on_earth(const struct native_anchor *a)
+{
+    return (a->moving & NATIVE_MOVING) == 0 && (a->lat_deg != 0.0 || a->lon_deg != 0.0 || a->height_m != 0.0);
+}
+
 /* Checks that the stream has all that the protocol needs, except for the emitter. NULL: nothing is missing; else a text
  * says what is. Amplitudes may be missing: protocols then use reflectances. */
 static const char *lacks(const struct replay *r, const struct protocol_ops *ops, const struct native_descriptor *d,
                          const struct native_emitter *e)
 {
-    const int first = e != NULL && e->echoes == NATIVE_ECHOES_FIRST, stands = (r->anchor.moving & NATIVE_MOVING) == 0;
+    const int first = e != NULL && e->echoes == NATIVE_ECHOES_FIRST;
     if ((ops->needs & PROTOCOL_NEEDS_POLAR) != 0 && d->layout != NATIVE_POLAR)
         return "has positions instead of ranges (layout geo); required is layout polar";
     if ((ops->needs & PROTOCOL_NEEDS_LAST) != 0 && first)
         return "has first echoes alone; required is all, last or strongest";
-    if ((ops->needs & PROTOCOL_NEEDS_TIME) != 0 && r->utc0_ns == INT64_MIN)
+    if ((ops->needs & PROTOCOL_NEEDS_TIME) != 0 && r->clock.n == 0)
         return "has no time of day; required is a recording of a head with time.epoch";
-    if ((ops->needs & PROTOCOL_NEEDS_PLACE) != 0 && (!stands || r->anchor.lat_deg == 0.0))
+    if ((ops->needs & PROTOCOL_NEEDS_PLACE) != 0 && !stands_on_earth(&r->anchor))
         return "has no place on the Earth where it stands; required is a station with one";
     return NULL;
 }
@@ -75,26 +81,26 @@ int replay_check_links(struct replay *r, const struct native_descriptor *d, cons
 
 /* ---- time of day */
 
-/* UTC; INT64_MIN: it is not known. A recording may have any number there; dates end in 2199 (core/utc.h). */
-static int64_t utc_at(struct replay *r, int64_t t_ns)
-{
-    static const int64_t LAST_NS = INT64_C(7258118400) * UTC_SECOND_NS;
-    pthread_mutex_lock(&r->lock);
-    const int is_known = r->utc0_ns != INT64_MIN;
-    const int64_t utc_ns = native_after_ns(r->utc0_ns, t_ns);
-    pthread_mutex_unlock(&r->lock);
-    return is_known && utc_ns > 0 && utc_ns < LAST_NS ? utc_ns : INT64_MIN;
-}
-
 int64_t replay_date_ns(void *self, int64_t t_ns)
 {
-    const int64_t utc_ns = utc_at(self, t_ns);
+    struct replay *r = self;
+    pthread_mutex_lock(&r->lock);
+    const int64_t utc_ns = replay_clock_head_ns(&r->clock, t_ns);
+    pthread_mutex_unlock(&r->lock);
     return utc_ns != INT64_MIN ? utc_ns : t_ns;
+}
+
+static int64_t receiver_ns(struct replay *r, int64_t t_ns)
+{
+    pthread_mutex_lock(&r->lock);
+    const int64_t utc_ns = replay_clock_receiver_ns(&r->clock, t_ns);
+    pthread_mutex_unlock(&r->lock);
+    return utc_ns;
 }
 
 enum protocol_pps replay_pps(void *self, int64_t t_ns, int64_t *hour_ns)
 {
-    const int64_t utc_ns = utc_at(self, t_ns);
+    const int64_t utc_ns = receiver_ns(self, t_ns);
     *hour_ns = (utc_ns != INT64_MIN ? utc_ns : t_ns) % (3600 * UTC_SECOND_NS);
     return utc_ns != INT64_MIN ? PROTOCOL_PPS_LOCKED : PROTOCOL_PPS_ABSENT;
 }
@@ -102,7 +108,7 @@ enum protocol_pps replay_pps(void *self, int64_t t_ns, int64_t *hour_ns)
 /* The receiver has one fix a second, at full seconds. */
 int64_t replay_next_fix_ns(void *self, int64_t t_ns)
 {
-    const int64_t utc_ns = utc_at(self, t_ns);
+    const int64_t utc_ns = receiver_ns(self, t_ns);
     if (utc_ns == INT64_MIN) return INT64_MAX;
     const int64_t since_ns = utc_ns % UTC_SECOND_NS;
     return since_ns == 0 ? t_ns : t_ns + UTC_SECOND_NS - since_ns;
@@ -114,14 +120,12 @@ int replay_fix(void *self, int64_t t_ns, struct nmea_fix *fix)
 {
     struct replay *r = self;
     struct utc_time utc;
-    const int64_t utc_ns = utc_at(r, t_ns);
-    if (utc_ns == INT64_MIN) return 0;
-    const struct utc_table *table = utc_table_builtin();
-    utc_from_tai(table, utc_tai_from_posix(table, utc_ns - utc_ns % UTC_SECOND_NS), &utc);
     pthread_mutex_lock(&r->lock);
+    const int is_known = replay_clock_receiver_ns(&r->clock, t_ns) != INT64_MIN;
+    if (is_known) replay_clock_receiver_utc(&r->clock, t_ns, &utc);
     const struct native_anchor a = r->anchor;
     pthread_mutex_unlock(&r->lock);
-    const int found = a.lat_deg != 0.0 && (a.moving & NATIVE_MOVING) == 0;
+    if (!is_known) return 0;
     *fix = (struct nmea_fix){.talker = {'G', 'N'},
                              .year = utc.year,
                              .month = utc.month,
@@ -129,7 +133,7 @@ int replay_fix(void *self, int64_t t_ns, struct nmea_fix *fix)
                              .hour = utc.hour,
                              .minute = utc.minute,
                              .second = utc.second,
-                             .quality = found,
+                             .quality = stands_on_earth(&a),
                              .satellites = 12,
                              .hdop = 0.7,
                              .lat_deg = a.lat_deg,

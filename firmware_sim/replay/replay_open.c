@@ -49,7 +49,7 @@ static int read_front(struct replay *r, struct sh_err *err)
     return recording_rewind(&r->recording, err);
 }
 
-/* Takes the time of day from the first telemetry frame, if it comes within two seconds. Heads send one each second. */
+/* Begins the clock with the first telemetry frame, if it comes within two seconds. Heads send one each second. */
 static int read_clock(struct replay *r, struct sh_err *err)
 {
     enum { LONG_ENOUGH_NS = 2000000000 };
@@ -62,7 +62,7 @@ static int read_clock(struct replay *r, struct sh_err *err)
         native_read_header(frame.bytes, &header);
         if (header.type != NATIVE_TELEMETRY) continue;
         if (native_decode_telemetry(frame.bytes + NATIVE_HEADER_LEN, header.length, &t) != SH_OK) continue;
-        if (t.utc_ns > 0) r->utc0_ns = native_since_ns(t.utc_ns, header.t_ns);
+        replay_clock_begin(&r->clock, header.t_ns, t.utc_ns);
         break;
     }
     return got < 0 ? got : recording_rewind(&r->recording, err);
@@ -159,7 +159,6 @@ int replay_open_recording(struct replay *r, struct sh_err *err)
     struct native_anchor a;
     int rc = check_faults(r->cfg, err);
     r->is_device = is_device(r->cfg);
-    r->utc0_ns = INT64_MIN;
     if (r->options.talk != NULL) {
         replay_open_commands(r);
         r->cmd.idn = r->idn;

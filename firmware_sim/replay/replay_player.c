@@ -26,6 +26,14 @@ static void replay_fail(struct replay *r, const struct sh_err *err)
     pthread_mutex_unlock(&r->lock);
 }
 
+/* Only for the first round: later ones repeat the recording, but the time of day goes on. */
+static void take_clock(struct replay *r, int64_t shift_ns)
+{
+    pthread_mutex_lock(&r->lock);
+    replay_clock_take(&r->clock, r->frame.bytes, shift_ns);
+    pthread_mutex_unlock(&r->lock);
+}
+
 /* Reads the next frame of the range into r->frame. 1: done; 0: there is none; -1: it failed, which is reported. */
 static int replay_look(struct replay *r)
 {
@@ -40,6 +48,7 @@ static int replay_look(struct replay *r)
         const int is_early = since_ns < r->begin_s * 1e9 || (r->is_device && r->frame.bytes[1] != NATIVE_POINTS);
         if (!r->in_range && is_early) {
             replay_keep_front(&r->front, r->frame.bytes);
+            if (r->times == 0) take_clock(r, 0);
             r->has_skipped = 1;
             continue;
         }
@@ -102,13 +111,6 @@ static void rebase(struct replay *r, uint64_t tick)
 static void set_shift(struct replay *r)
 {
     r->shift_ns = (int64_t)((r->start_tick - (uint64_t)r->base) * (uint64_t)r->tick_ns);
-}
-
-/* In the first round, the time of day becomes the recorded one. */
-static void set_clock(struct replay *r)
-{
-    set_shift(r);
-    if (r->utc0_ns != INT64_MIN && r->times == 1) r->utc0_ns = native_since_ns(r->utc0_ns, r->shift_ns);
 }
 
 /* Returns the tick with which the next frame goes out. */
@@ -184,7 +186,8 @@ void replay_begin(struct replay *r, uint64_t tick)
     r->pace = r->speed;
     r->times++;
     r->position_ns = native_since_ns(r->frame.t_ns, r->first_ns);
-    set_clock(r);
+    set_shift(r);
+    if (r->times == 1) replay_clock_shift(&r->clock, r->shift_ns); /* so far it was that of the recording's times */
     replay_set_state(r, tick, HEAD_SCANNING);
     pthread_mutex_unlock(&r->lock);
     if (needs_front(r)) add_front(r, tick);
@@ -206,8 +209,9 @@ void replay_fill(struct replay *r, uint64_t tick, int may_skip)
         if (due > tick && !(may_skip && r->len == 0)) return;
         if (due > tick) r->start_tick -= due - tick;           /* may wrap below 0: due_tick() wraps back */
         if (r->len + r->frame.len > REPLAY_MOST_BYTES) return; /* the rest comes with the next tick */
-        replay_add(r, r->frame.bytes, r->frame.len, tick);
         set_shift(r);
+        if (r->times == 1) take_clock(r, r->shift_ns);
+        replay_add(r, r->frame.bytes, r->frame.len, tick);
         r->has_frame = 0;
     }
     replay_stop(r, tick, found == 0);

@@ -8,6 +8,7 @@
 #include "firmware_sim/device/fault_desk.h"
 #include "firmware_sim/replay/recording.h"
 #include "firmware_sim/replay/replay.h"
+#include "firmware_sim/replay/replay_clock.h"
 
 enum { REPLAY_CHANGES = 32, REPLAY_FRONT = 3, REPLAY_FRONT_ROOM = 2048, REPLAY_MOST_BYTES = 1 << 20 /* of a tick */ };
 
@@ -52,9 +53,8 @@ struct replay {
      * see such a command at once, ticks before that change. */
     uint32_t stopped, begun;
     struct sh_err failure; /* code 0: none */
-    /* Time of day at device time 0 of the run, ns since 1970. The first round sets it so that frames have the time
-     * that they were recorded with; it then goes on. INT64_MIN: the recording has none. */
-    int64_t utc0_ns;
+    /* In the first round it shows the times that the recorded head had. It then goes on. */
+    struct replay_clock clock;
     struct native_anchor anchor; /* the last one */
 
     /* of the player's thread; until that begins, of the thread that opens */

@@ -158,6 +158,20 @@ static int choose_scale(struct site *site, struct sh_err *err)
     return rc;
 }
 
+/* Returns the largest coordinate that has to fit, in metres. */
+static double most_coordinate_m(const struct site *site)
+{
+    const double range_m = longest_m(site);
+    double most_m = 0.0;
+    for (uint32_t i = 0; i < site->n_stations; i++) {
+        const struct site_station *s = &site->station[i];
+        if (s->on_stretch == NULL) most_m = fmax(most_m, georef_span_m(s->georef, range_m + site->live_reach_m));
+        for (size_t k = 0; s->on_stretch != NULL && k < site->n_stretches; k++)
+            most_m = fmax(most_m, georef_span_m(s->on_stretch[k].georef, range_m + site->stretch[k].reach_m));
+    }
+    return most_m;
+}
+
 static void warn_of_coarse_counts(const struct site *site, const struct sh_report *report)
 {
     const int polar = site->cfg->output.layout == LINE_POLAR;
@@ -167,7 +181,7 @@ static void warn_of_coarse_counts(const struct site *site, const struct sh_repor
         "output.scale_m: a count on the wire is %g m, not %g: %s up to %.6g m must fit into %d bits, but at %g m only "
         "those up to %.0f m do",
         site->scale_m, FINEST_M, polar ? "ranges" : "coordinates",
-        longest_m(site) + (polar ? site_ball_m(site) : site->live_reach_m), polar ? 32 : 31, FINEST_M,
+        polar ? longest_m(site) + site_ball_m(site) : most_coordinate_m(site), polar ? 32 : 31, FINEST_M,
         FINEST_M * MOST_RANGE_COUNTS / (polar ? 1.0 : 2.0));
 }
 

@@ -48,6 +48,12 @@ static int check_part(const struct site *site, double length_s, struct sh_err *e
     /* A scan that ends with the trajectory has no pulse if it begins at the trajectory's end. A head that scans at
      * stops may begin there: it has one stop. So may a platform that waits at the end. */
     const int must_go = p->kind == PLATFORM_TRAJECTORY && p->at_end == PLATFORM_STOP;
+    if (must_go && !(length_s > 0.0))
+        return sh_fail(
+            err, SH_EINPUT,
+            "%s: platform.kind trajectory: the trajectory has one pose, and the scan would end with it; allowed "
+            "two poses and more, or at_end: hold",
+            site->cfg->file);
     if (!wrong_end && must_go && p->start_s >= length_s - ROUNDING_S)
         return sh_fail(err, SH_EINPUT,
                        "%s: platform.%s: %.9g %s is not before the trajectory's end; allowed 0 to below %.9g",

@@ -211,6 +211,33 @@ static void points_go_back_to_the_scene(void **state)
     check_crs(GEOREF_GEODETIC, 4979);
 }
 
+/* Points of `record --crs` need the same system in the scene, which --set gives. Other systems are none of a head's. */
+static void points_in_a_system_of_a_head_get_advice(void **state)
+{
+    (void)state;
+    static const struct {
+        int64_t epsg;
+        const char *end;
+    } rows[] = {{4978, "(0: scene frame); allowed with --set output.layout=geo --set output.crs=ecef"},
+                {4979, "(0: scene frame); allowed with --set output.layout=geo --set output.crs=geodetic"},
+                {32601, "(0: scene frame); allowed with --set output.layout=geo --set output.crs=utm"},
+                {32761, "(0: scene frame); allowed with --set output.layout=geo --set output.crs=utm"},
+                {32600, "(0: scene frame)"},
+                {32762, "(0: scene frame)"},
+                {25832, "(0: scene frame)"}};
+    double xyz[1][3] = {{0}}, distance_m[1];
+    uint16_t station[1] = {1};
+    uint32_t triangle[1];
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        const struct cloud c = {.n = 1, .xyz_m = xyz, .station = station, .epsg = rows[i].epsg};
+        const struct cloud_site site = {.n_stations = 1, .max_m = 10, .threads = 1};
+        struct sh_err err;
+        assert_int_equal(cloud_compare(&c, &site, NULL, distance_m, triangle, &err), SH_EINPUT);
+        const size_t len = strlen(err.text), end = strlen(rows[i].end);
+        if (len < end || strcmp(err.text + len - end, rows[i].end) != 0) fail_msg("case %zu: %s", i, err.text);
+    }
+}
+
 static void coverage_is_counted(void **state)
 {
     (void)state;
@@ -335,10 +362,15 @@ static void sums_do_not_drift(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_last_point_counts),  cmocka_unit_test(offsets_from_a_plate),
-        cmocka_unit_test(threads_change_nothing), cmocka_unit_test(points_go_back_to_the_scene),
-        cmocka_unit_test(coverage_is_counted),    cmocka_unit_test(statistics_of_whole_numbers),
-        cmocka_unit_test(statistics_of_little),   cmocka_unit_test(percentiles_are_nearest_ranks),
+        cmocka_unit_test(the_last_point_counts),
+        cmocka_unit_test(offsets_from_a_plate),
+        cmocka_unit_test(threads_change_nothing),
+        cmocka_unit_test(points_go_back_to_the_scene),
+        cmocka_unit_test(points_in_a_system_of_a_head_get_advice),
+        cmocka_unit_test(coverage_is_counted),
+        cmocka_unit_test(statistics_of_whole_numbers),
+        cmocka_unit_test(statistics_of_little),
+        cmocka_unit_test(percentiles_are_nearest_ranks),
         cmocka_unit_test(sums_do_not_drift),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

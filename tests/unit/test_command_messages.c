@@ -230,14 +230,16 @@ static void devices_refuse_word_by_word(void **state)
                                   "HEAD:NOISe:ANGLe ON needs mirror_sigma_deg or pan_sigma_deg of the head profile\""}},
         1);
     dev.recorded = "a recording is replayed";
-    expect_refused(&dev, 1,
-                   (const struct refused[]){
-                       {"HEAD:PRR 5000", CONFLICT "HEAD:PRR: a recording is replayed; it is 300000\""},
-                       {"HEAD:REB", CONFLICT "HEAD:REBoot: a recording is replayed\""},
-                       {"TIME:SHIF 5", CONFLICT "TIME:SHIFt: a recording is replayed\""},
-                       {"TIME:SERV NONE,127.0.0.1,600,0,ETH", CONFLICT "TIME:SERVer: a recording is replayed\""},
-                       {"TIME:UTC?", CONFLICT "TIME:UTC? is not possible: the recording does not have this value\""}},
-                   5);
+    expect_refused(
+        &dev, 1,
+        (const struct refused[]){
+            {"HEAD:PRR 5000", CONFLICT "HEAD:PRR: a recording is replayed; it is 300000\""},
+            {"HEAD:REB", CONFLICT "HEAD:REBoot: a recording is replayed\""},
+            {"TIME:SHIF 5", CONFLICT "TIME:SHIFt: a recording is replayed\""},
+            {"TIME:SERV NONE,127.0.0.1,600,0,ETH", CONFLICT "TIME:SERVer: a recording is replayed\""},
+            {"TIME:UTC?",
+             CONFLICT "TIME:UTC? is not answered in a replay; telemetry has the value, if the recorded head had it\""}},
+        5);
 }
 
 /* Ranges and noise are planned, so they can't change in a scan, and neither can the station. HELP? says so, too. */

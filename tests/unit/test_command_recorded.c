@@ -54,7 +54,8 @@ static void a_value_may_be_unknown(void **state)
     expect(&dev, "HEAD:PRR 5000", CONFLICT "HEAD:PRR: the recording does not have this value\"");
     expect(&dev, "SCAN:FRAMes?", CONFLICT "SCAN:FRAMes: the recording does not have this value\"");
     expect(&dev, "SCAN:ECHoes ALL", CONFLICT "SCAN:ECHoes: the recording does not have this value\"");
-    expect(&dev, "TIME:UTC?", CONFLICT "TIME:UTC? is not possible: the recording does not have this value\"");
+    expect(&dev, "TIME:UTC?",
+           CONFLICT "TIME:UTC? is not answered in a replay; telemetry has the value, if the recorded head had it\"");
     expect(&dev, "HEAD:PAN?", "18");
     dev.recorded = NULL; /* a head's value may be any number */
     expect(&dev, "SCAN:FRAMes?", "4294967295");

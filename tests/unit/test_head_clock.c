@@ -245,6 +245,30 @@ static void leap_seconds(void **state)
     assert_true(table.leap[table.n - 2].posix_s == 1451606460 && table.leap[table.n - 2].tai_minus_utc == last);
 }
 
+/* It is 00:00:00.3. The head's clock is 100 s behind or ahead, and shares its table with the receiver. The minute of the
+ * one that is ahead gets the second 60, so the other one has it later, and neither goes back. */
+static void a_leap_second_is_ahead_of_both_clocks(void **state)
+{
+    (void)state;
+    static const struct {
+        double offset_s;
+        int64_t posix_s, true_60_ns;
+    } rows[] = {{-100, 1767225660, 59700000000}, {100, 1767225720, 119700000000}};
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        struct head_clock clock = make_clock(rows[i].offset_s, 0, 0, 0);
+        const int64_t head_60_ns = rows[i].true_60_ns - llround(1e9 * rows[i].offset_s);
+        struct utc_time utc;
+        int64_t posix_s;
+        assert_true(head_clock_add_leap(&clock, 0, &posix_s) && posix_s == rows[i].posix_s);
+        utc_from_tai(&clock.table, head_clock_true_ns(&clock, 700000000), &utc);
+        assert_true(utc.minute == 0 && utc.second == 1);
+        utc_from_tai(&clock.table, head_clock_true_ns(&clock, rows[i].true_60_ns), &utc);
+        assert_int_equal(utc.second, 60);
+        utc_from_tai(&clock.table, head_clock_ns(&clock, head_60_ns), &utc);
+        assert_int_equal(utc.second, 60);
+    }
+}
+
 static void epochs(void **state)
 {
     (void)state;
@@ -371,6 +395,7 @@ int main(void)
         cmocka_unit_test(stands_on_a_second),
         cmocka_unit_test(forgets_the_oldest),
         cmocka_unit_test(leap_seconds),
+        cmocka_unit_test(a_leap_second_is_ahead_of_both_clocks),
         cmocka_unit_test(epochs),
         cmocka_unit_test(the_systems_clock),
         cmocka_unit_test(the_systems_tai),

@@ -109,10 +109,45 @@ static void several_map_conversions(void **state)
     }
 }
 
+/* A foot is 0.3048 m, and a US survey foot 1200 / 3937 m: the axes of EPSG:2225 (California, zone 1) are in the latter,
+ * those of EPSG:2222 (Arizona, east) in the former (EPSG registry). They differ by 2e-6, and maps have scales of their
+ * own. So the system decides, and where PROJ does not know it, the nearest one. */
+static void feet_of_two_kinds(void **state)
+{
+    (void)state;
+    static const double FOOT_M = 0.3048, SURVEY_FOOT_M = 1200.0 / 3937.0;
+    static const struct {
+        const char *crs, *scale;
+        double unit_m;
+    } rows[] = {
+        {"EPSG:2225", "0.00328083333333333", SURVEY_FOOT_M},
+        {"EPSG:2225", "0.00328083989501312", SURVEY_FOOT_M},
+        {"EPSG:2225", "0.0032801", SURVEY_FOOT_M},
+        {"EPSG:2225", "0.001", 1.0}, /* the file says metres */
+        {"EPSG:2222", "0.00328083333333333", FOOT_M},
+        {"EPSG:2222", "0.0032815", FOOT_M},
+        {"local", "0.00328083333333333", SURVEY_FOOT_M},
+        {"local", "0.00328083989501312", FOOT_M},
+        {"local", "0.0032801", SURVEY_FOOT_M},
+        {"local", "0.0032815", FOOT_M},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        char more[512];
+        snprintf(more, sizeof more,
+                 "#20= IFCMAPCONVERSION(#5,#21,6500000.,2000000.,5.,1.,0.,%s);\n"
+                 "#21= IFCPROJECTEDCRS('%s',$,$,$,$,$,$);\n",
+                 rows[i].scale, rows[i].crs);
+        assert_loads(load_map(more));
+        assert_near(site.map.easting_m, 6500000.0 * rows[i].unit_m);
+        assert_near(site.map.height_m, 5.0 * rows[i].unit_m);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(factors_of_a_map_conversion),
+        cmocka_unit_test(feet_of_two_kinds),
         cmocka_unit_test(several_map_conversions),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

@@ -236,11 +236,36 @@ static void test_room(void **state)
     }
 }
 
+/* A week has the seconds 0 to 604,799. A time just before its end, to a microsecond, is the begin of the next. */
+static void test_weeks(void **state)
+{
+    (void)state;
+    static const struct {
+        double second;
+        const char *text;
+    } rows[] = {{604799.9999997, "GPS week 2400 second 0.000000\n"},
+                {604799.999999, "GPS week 2399 second 604799.999999\n"},
+                {0.0, "GPS week 2399 second 0.000000\n"},
+                {12.25, "GPS week 2399 second 12.250000\n"}};
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        struct sh_err err;
+        char *text;
+        size_t len;
+        uint64_t n_left_out;
+        begin();
+        facts.have_gps = 1;
+        facts.gps_s = 2399 * 604800.0 + rows[i].second;
+        assert_int_equal(ply_header_make(&facts, 0, &text, &len, &n_left_out, &err), 0);
+        if (strstr(text, rows[i].text) == NULL) fail_msg("case %zu: %s", i, text);
+        free(text);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_all),          cmocka_unit_test(test_least), cmocka_unit_test(test_names),
-        cmocka_unit_test(test_single_lines), cmocka_unit_test(test_room),
+        cmocka_unit_test(test_single_lines), cmocka_unit_test(test_room),  cmocka_unit_test(test_weeks),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

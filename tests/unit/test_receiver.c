@@ -166,6 +166,25 @@ static void sentences_go_wrong(void **state)
     rig_close(rig);
 }
 
+/* Power is off from 2.2 to 3.6 s. So what arrived at 2.5 and 3.5 s reaches nobody, and the first sentence since power-up
+ * is that of 4.5 s. Sessions that are late still get what was before. */
+static void a_head_without_power_hears_nothing(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"faults[0].kind=power_cycle", "faults[0].from_s=2.2", "faults[0].for_ms=1400"};
+    struct nmea_fix fix;
+    struct rig *rig = open_with(sets, sizeof sets / sizeof *sets);
+    assert_int_equal(second_at(rig, 2.19, &fix), 3599);
+    assert_int_equal(second_at(rig, 2.2, &fix), -1);
+    assert_int_equal(second_at(rig, 2.5, &fix), -1);
+    assert_int_equal(second_at(rig, 3.5, &fix), -1);
+    assert_int_equal(second_at(rig, 3.6, &fix), -1);
+    assert_int_equal(second_at(rig, 4.499, &fix), -1);
+    assert_int_equal(second_at(rig, 4.5, &fix), 2);
+    assert_int_equal(second_at(rig, 2.19, &fix), 3599);
+    rig_close(rig);
+}
+
 /* At the highest rate sentences are as late as can be: 5 s by the setting, and 10 s by faults that add up to 20 s. All
  * sentences under way are still there. */
 static void late_sentences_are_not_lost(void **state)
@@ -366,6 +385,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(follows_what_comes),
         cmocka_unit_test(sentences_go_wrong),
+        cmocka_unit_test(a_head_without_power_hears_nothing),
         cmocka_unit_test(late_sentences_are_not_lost),
         cmocka_unit_test(late_pulses_have_their_second),
         cmocka_unit_test(the_rotor_is_where_the_lock_wants_it),

@@ -19,7 +19,7 @@ struct recorded {
     enum protocol_id protocol;
     uint32_t emitter, n_beams, layout, echoes, moving;
     int64_t utc0_ns;
-    double lat_deg, speed;
+    double lat_deg, lon_deg, height_m, speed;
     const char *says; /* NULL: it can be that device */
 };
 
@@ -36,8 +36,10 @@ static void expect_answer(const struct recorded *row, size_t i)
     r->cfg = cfg;
     r->options.path = "a.shs";
     r->options.speed = row->speed;
-    r->utc0_ns = row->utc0_ns;
+    replay_clock_begin(&r->clock, 0, row->utc0_ns);
     r->anchor.lat_deg = row->lat_deg;
+    r->anchor.lon_deg = row->lon_deg;
+    r->anchor.height_m = row->height_m;
     r->anchor.moving = row->moving;
     const struct native_descriptor d = {.layout = (uint8_t)row->layout};
     const struct native_emitter e = {.kind = row->emitter, .n_beams = row->n_beams, .echoes = row->echoes};
@@ -58,6 +60,9 @@ static void a_recording_is_the_devices_that_it_can_be(void **state)
         {PROTOCOL_NMEA, NO_EMITTER, .utc0_ns = SECOND_NS, .lat_deg = 50.0, .speed = 1.0},
         {PROTOCOL_NMEA, NATIVE_EMIT_SPHERE, .utc0_ns = SECOND_NS, .lat_deg = -50.0, .speed = 1.0},
         {PROTOCOL_NMEA, NATIVE_EMIT_BEAMS, 16, .utc0_ns = SECOND_NS, .lat_deg = 50.0, .speed = 1.0},
+        /* on the equator; where it meets the meridian of Greenwich, 20 m above the ellipsoid */
+        {PROTOCOL_NMEA, NO_EMITTER, .utc0_ns = SECOND_NS, .lon_deg = -78.5, .speed = 1.0},
+        {PROTOCOL_NMEA, NO_EMITTER, .utc0_ns = SECOND_NS, .height_m = 20.0, .speed = 1.0},
         {PROTOCOL_NMEA, NO_EMITTER, .utc0_ns = INT64_MIN, .lat_deg = 50.0, .speed = 1.0,
          .says = "nmea: a.shs has no time of day; required is a recording of a head with time.epoch"},
         {PROTOCOL_NMEA, NO_EMITTER, .utc0_ns = SECOND_NS, .speed = 1.0, .says = "has no place on the Earth"},
@@ -96,7 +101,7 @@ static struct replay *replay_with(int64_t utc0_ns, double lat_deg)
     struct replay *r = calloc(1, sizeof *r);
     assert_non_null(r);
     pthread_mutex_init(&r->lock, NULL);
-    r->utc0_ns = utc0_ns;
+    replay_clock_begin(&r->clock, 0, utc0_ns);
     r->anchor.lat_deg = lat_deg;
     r->anchor.lon_deg = 8.5;
     r->anchor.height_m = 110.0;
@@ -128,7 +133,10 @@ static void fixes_are_at_full_seconds(void **state)
     assert_true(fix.lat_deg == 49.0 && fix.lon_deg == 8.5 && fix.altitude_m == 110.0);
     assert_true(fix.talker[0] == 'G' && fix.talker[1] == 'N' && fix.satellites == 12 && fix.hdop == 0.7);
     assert_true(isnan(fix.course_deg));
-    r->anchor.lat_deg = 0.0; /* no place */
+    r->anchor.lat_deg = 0.0; /* a place on the equator */
+    assert_int_equal(replay_fix(r, 0, &fix), 1);
+    assert_int_equal(fix.quality, 1);
+    r->anchor.lon_deg = r->anchor.height_m = 0.0; /* no place */
     assert_int_equal(replay_fix(r, 0, &fix), 1);
     assert_int_equal(fix.quality, 0);
     r->anchor.lat_deg = 49.0;
@@ -144,13 +152,13 @@ static void dates_are_within_what_a_calendar_has(void **state)
 {
     (void)state;
     static const int64_t LAST_NS = INT64_C(7258118400) * SECOND_NS;
-    struct replay *r = replay_with(0, 49.0);
+    struct replay *r = replay_with(2, 49.0);
     struct nmea_fix fix;
     int64_t hour_ns;
-    assert_int_equal(replay_pps(r, 0, &hour_ns), PROTOCOL_PPS_ABSENT);
-    assert_int_equal(replay_pps(r, 1, &hour_ns), PROTOCOL_PPS_LOCKED);
+    assert_int_equal(replay_pps(r, -2, &hour_ns), PROTOCOL_PPS_ABSENT);
+    assert_int_equal(replay_pps(r, -1, &hour_ns), PROTOCOL_PPS_LOCKED);
     assert_int_equal(hour_ns, 1);
-    r->utc0_ns = LAST_NS - 5;
+    replay_clock_begin(&r->clock, 0, LAST_NS - 5);
     assert_int_equal(replay_date_ns(r, 4), LAST_NS - 1);
     assert_int_equal(replay_fix(r, 4, &fix), 1);
     assert_true(fix.year == 2199 && fix.month == 12 && fix.day == 31);

@@ -275,7 +275,8 @@ static void a_client_joins_late(void **state)
     expect_log("create |open 12|frame 0 at 50|");
 }
 
-/* When power goes, a session that goes on begins anew at its cursor. What still waited in it is gone. */
+/* When power goes, a session that goes on begins anew at its cursor, or when power comes: nothing is sent by itself
+ * before. What still waited in it is gone. */
 static void a_session_is_restarted(void **state)
 {
     (void)state;
@@ -287,6 +288,9 @@ static void a_session_is_restarted(void **state)
     logged[0] = '\0';
     session_restart(&pump, s, 7);
     expect_log("destroy|create |open 6|");
+    s->cursor = 2; /* power comes with tick 4 */
+    session_restart(&pump, s, 7);
+    expect_log("destroy|create |open 4|");
     assert_true(s->power_from == 8 && s->units.n == 0 && s->commands.in_len == 0 && s->open == 1);
 }
 

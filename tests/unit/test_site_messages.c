@@ -46,6 +46,8 @@ static void write_far_head(void)
 {
     write_head("far.yaml", "config/heads/riegl-vz2000i.yaml", "range_max_m: { value: 2500,",
                "range_max_m: { value: 5000,");
+    write_head("within.yaml", "config/heads/any-rate.yaml", "range_max_m: { value: 800,",
+               "range_max_m: { value: 2140,");
 }
 
 /* FILE stands for the configuration's path. */
@@ -126,6 +128,13 @@ static const struct {
     {"profile: riegl-vz2000i", 1, STATION SINGLE "output: {layout: geo}\n",
      {"output.scale_m: a count on the wire is 1e-05 m, not 1e-06: coordinates up to 2500 m must fit into 31 bits, but at "
       "1e-06 m only those up to 2147 m do"}},
+    /* Its range of 2140 m would fit. Heights may differ by 1 % more, and by 2140^2 / (2 x 6.3e6) m for the Earth's
+     * curvature. */
+    {"profile: within.yaml", 1,
+     "stations: [{position_m: [0, 0, 2], lat_deg: 50, lon_deg: 11, height_m: 0}]\n" SINGLE
+     "output: {layout: geo, crs: utm}\n",
+     {"output.scale_m: a count on the wire is 1e-05 m, not 1e-06: coordinates up to 2161.76 m must fit into 31 bits, but "
+      "at 1e-06 m only those up to 2147 m do"}},
     {"profile: far.yaml", 1, STATION SINGLE,
      {"output.scale_m: a count on the wire is 1e-05 m, not 1e-06: ranges up to 5000 m must fit into 32 bits, but at 1e-06 m "
       "only those up to 4295 m do"}},

@@ -61,6 +61,12 @@ static void a_part_lies_on_the_trajectory(void **state)
            ": platform.first_frame: 13 frames is after the trajectory's end; allowed 0 to 12");
     refuse(ONE, STOPS ", frames_per_s: 10, first_frame: 3, last_frame: 14", "",
            ": platform.last_frame: 14 frames is after the trajectory's end; allowed 3 to 12");
+    write_in("pose.csv", "t_s,x_m,y_m,z_m,roll_deg,pitch_deg,heading_deg\n0,1,0,2,0,0,0\n");
+    refuse(ONE, "kind: trajectory, file: pose.csv", "",
+           ": platform.kind trajectory: the trajectory has one pose, and the scan would end with it; allowed two poses "
+           "and more, or at_end: hold");
+    take(ONE, "kind: trajectory, file: pose.csv, at_end: hold");
+    take(ONE, "kind: stops, file: pose.csv, step_s: 0.1");
     take(ONE, GOES ", start_s: 1.1999, end_s: 1.2");
     take(ONE, GOES ", start_s: 1.2, at_end: hold");
     take(ONE, STOPS ", step_s: 0.1, start_s: 1.2");

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "core/angle.h"
+#include "core/crs.h"
 #include "core/grow.h"
 #include "core/import/ifc/ifc_index.h"
 #include "core/import/ifc/ifc_text.h"
@@ -213,14 +214,24 @@ static int read_north(struct reader *r, struct ifc_site *site)
 
 /* ---- the map */
 
-/* Returns the usual unit of maps that is within 1 % of m metres, or NaN. The 1 % leaves room for the map's own scale,
- * which differs from 1 by less. */
-static double known_unit_m(double m, double model_m)
+/* The 1 % leaves room for the map's own scale, which differs from 1 by less. */
+static bool is_about(double a, double b)
 {
-    const double known[] = {1.0, model_m, 0.3048, 1200.0 / 3937.0};
-    for (size_t i = 0; i < sizeof known / sizeof known[0]; i++)
-        if (fabs(m / known[i] - 1.0) < 0.01) return known[i];
-    return NAN;
+    return fabs(a / b - 1.0) < 0.01;
+}
+
+/* Returns the unit of maps that is meant by m metres, or NaN. The two kinds of foot differ by 2e-6, less than the map's
+ * own scale, so m can't tell them apart: the unit of the system's axes goes before all others. Where PROJ doesn't know
+ * the system, it is the usual unit nearest to m, where the model's own goes before an equal one. */
+static double map_unit_m(const char *crs, double m, double model_m)
+{
+    const double usual[] = {model_m, 1.0, 0.3048, 1200.0 / 3937.0};
+    double nearest_m = NAN, axis_m;
+    struct sh_err unknown;
+    if (crs_unit(crs, 0, &axis_m, &unknown) == SH_OK && is_about(m, axis_m)) return axis_m;
+    for (size_t i = 0; i < sizeof usual / sizeof usual[0]; i++)
+        if (is_about(m, usual[i]) && !(fabs(m / usual[i] - 1.0) >= fabs(m / nearest_m - 1.0))) nearest_m = usual[i];
+    return nearest_m;
 }
 
 /* A map conversion that is being read, with its numbers by the places of attributes. */
@@ -235,8 +246,8 @@ struct conversion {
 static int check_scale(struct reader *r, const struct conversion *c, double expected)
 {
     char what[128];
-    if (c->value[MAP_SCALE] == 1.0 && fabs(c->scale - 1.0) < 0.01) return SH_OK;
-    if (fabs(c->scale / expected - 1.0) < 0.01) return SH_OK;
+    if (c->value[MAP_SCALE] == 1.0 && is_about(c->scale, 1.0)) return SH_OK;
+    if (is_about(c->scale, expected)) return SH_OK;
     snprintf(what, sizeof what,
              "a Scale of %.9g beside a MapUnit; allowed about %.9g, the model's unit in units of the map", c->scale,
              expected);
@@ -255,7 +266,7 @@ static int check_factors(struct reader *r, const struct conversion *c)
                                  i == MAP_SCALE ? "a Scale that is not above 0"
                                                 : "a factor of an axis that is not above 0");
     for (int i = MAP_FACTOR_Y; i <= MAP_FACTOR_Z; i++) {
-        if (fabs(v[i] / v[MAP_FACTOR_X] - 1.0) < 0.01) continue;
+        if (is_about(v[i], v[MAP_FACTOR_X])) continue;
         snprintf(
             what, sizeof what,
             "factors of %.9g, %.9g and %.9g for the axes; allowed within 1 %% of each other, since the model is not "
@@ -266,15 +277,15 @@ static int check_factors(struct reader *r, const struct conversion *c)
     return SH_OK;
 }
 
-static int read_map_unit(struct reader *r, const struct conversion *c, const struct found *crs, double model_m,
-                         double *m)
+static int read_map_unit(struct reader *r, const struct conversion *c, const struct found *crs, const char *name,
+                         double model_m, double *m)
 {
     uint64_t id;
     if (step_reference(crs->arg[CRS_UNIT], &id)) {
         int rc = advise(r, ifc_unit_of(&r->index, ifc_index_find(&r->index, id), m, r->err));
         return rc == SH_OK ? check_scale(r, c, model_m / *m) : rc;
     }
-    *m = known_unit_m(model_m / c->scale, model_m);
+    *m = map_unit_m(name, model_m / c->scale, model_m);
     return isnan(*m) ? ifc_site_fail(r, c->record, "its Scale fits no unit of maps, and the system has no MapUnit")
                      : SH_OK;
 }
@@ -329,7 +340,7 @@ static int read_map(struct reader *r, const struct step_record *record, double u
     struct conversion c = {.record = record};
     struct text_span arg[STEP_MAX_ARGS];
     struct found crs;
-    double map_unit_m = 1.0;
+    double m = 1.0; /* metres per unit of the map */
     *map = (struct ifc_map){.crs = ""};
     if (step_split(record->args, arg, STEP_MAX_ARGS) < (size_t)n)
         return ifc_site_fail(
@@ -337,11 +348,11 @@ static int read_map(struct reader *r, const struct step_record *record, double u
     int rc = ifc_site_follow(r, record, arg[MAP_CRS], "IFCPROJECTEDCRS", CRS_ARGS, &crs);
     if (rc == SH_OK) rc = read_map_name(r, &crs, map);
     if (rc == SH_OK) rc = read_map_numbers(r, &c, arg, n);
-    if (rc == SH_OK) rc = read_map_unit(r, &c, &crs, unit_m, &map_unit_m);
+    if (rc == SH_OK) rc = read_map_unit(r, &c, &crs, map->crs, unit_m, &m);
     if (rc != SH_OK) return rc;
-    map->easting_m = c.value[MAP_EASTING] * map_unit_m;
-    map->northing_m = c.value[MAP_NORTHING] * map_unit_m;
-    map->height_m = c.value[MAP_HEIGHT] * map_unit_m;
+    map->easting_m = c.value[MAP_EASTING] * m;
+    map->northing_m = c.value[MAP_NORTHING] * m;
+    map->height_m = c.value[MAP_HEIGHT] * m;
     map->x_axis_rad = atan2(c.value[MAP_ORDINATE], c.value[MAP_ABSCISSA]);
     return SH_OK;
 }

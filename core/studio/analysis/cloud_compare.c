@@ -30,6 +30,16 @@ static const struct georef *georef_of(const struct cloud *cloud, const struct cl
     return site->georef != NULL ? site->georef[cloud_station(cloud, i) - 1] : NULL;
 }
 
+/* Returns what a scene needs for points in this system, which came from `record --crs`. Empty: nothing helps. */
+static const char *advice_for(int64_t epsg, const struct georef *georef)
+{
+    if (georef != NULL && georef_epsg(georef) != 0) return "";
+    if (epsg == 4978) return "; allowed with --set output.layout=geo --set output.crs=ecef";
+    if (epsg == 4979) return "; allowed with --set output.layout=geo --set output.crs=geodetic";
+    const int64_t zone = epsg - (epsg > 32700 ? 32700 : 32600);
+    return zone >= 1 && zone <= 61 ? "; allowed with --set output.layout=geo --set output.crs=utm" : "";
+}
+
 static int check_stations(const struct cloud *cloud, const struct cloud_site *site, struct sh_err *err)
 {
     for (size_t i = 0; i < cloud->n; i++) {
@@ -41,8 +51,8 @@ static int check_stations(const struct cloud *cloud, const struct cloud_site *si
         int epsg = georef != NULL ? georef_epsg(georef) : 0;
         if (cloud->epsg != CLOUD_EPSG_UNKNOWN && cloud->epsg != epsg)
             return sh_fail(err, SH_EINPUT,
-                           "the points are in EPSG %lld, but those of station %u must be in EPSG %d (0: scene frame)",
-                           (long long)cloud->epsg, station, epsg);
+                           "the points are in EPSG %lld, but those of station %u must be in EPSG %d (0: scene frame)%s",
+                           (long long)cloud->epsg, station, epsg, advice_for(cloud->epsg, georef));
     }
     return SH_OK;
 }
