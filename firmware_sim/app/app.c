@@ -331,14 +331,16 @@ int app_write_json(const char *path, void (*put)(struct json *json, const void *
 int app_say_ready(long fd, void (*put)(struct json *json, const void *ctx), const void *ctx, struct sh_err *err)
 {
     if (fd == 0) return SH_OK;
-    FILE *out = fdopen(dup((int)fd), "w");
-    if (out == NULL) return sh_fail(err, SH_EINPUT, "--ready-fd %ld: %s", fd, strerror(errno));
+    /* Standard streams stay open: else the next file or session would get their numbers and the messages. */
+    FILE *out = fd > STDERR_FILENO ? fdopen((int)fd, "w") : newfile_stream((int)fd, "w");
+    if (out == NULL) {
+        const int is_theirs = errno == EBADF || errno == EINVAL; /* not open, or not for writing */
+        return sh_fail(err, is_theirs ? SH_EINPUT : SH_EIO, "--ready-fd %ld: %s", fd, strerror(errno));
+    }
     struct json json;
     json_begin_one_line(&json, out);
     put(&json, ctx);
     int failed = json_end(&json, NULL) != SH_OK;
     failed |= fclose(out) != 0;
-    /* Standard streams stay open: else the next file or session would get their numbers and the messages. */
-    if (fd > STDERR_FILENO) close((int)fd);
     return failed ? sh_fail(err, SH_EIO, "--ready-fd %ld: %s", fd, strerror(errno)) : SH_OK;
 }

@@ -8,6 +8,7 @@
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <cmocka.h>
@@ -265,6 +266,28 @@ static void a_ready_line_goes_to_its_descriptor(void **state)
     assert_non_null(strstr(err.text, "--ready-fd 9999: "));
 }
 
+/* Without a free descriptor, one of its own gets the line all the same. A standard stream, which needs another, has the
+ * system's reason, and the user's command was right. */
+static void a_ready_line_without_a_free_descriptor(void **state)
+{
+    static const int seven = 7;
+    struct sh_err err = {0};
+    struct rlimit before, none;
+    int fd[2];
+    (void)state;
+    assert_int_equal(pipe(fd), 0);
+    assert_int_equal(getrlimit(RLIMIT_NOFILE, &before), 0);
+    none = before;
+    none.rlim_cur = 0;
+    assert_int_equal(setrlimit(RLIMIT_NOFILE, &none), 0);
+    const int to_stderr = app_say_ready(STDERR_FILENO, put_one, &seven, &err);
+    const int to_own = app_say_ready(fd[1], put_one, &seven, NULL);
+    assert_int_equal(setrlimit(RLIMIT_NOFILE, &before), 0);
+    assert_true(to_own == SH_OK && to_stderr == SH_EIO);
+    assert_string_equal(err.text, "--ready-fd 2: Too many open files");
+    close(fd[0]);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -280,6 +303,7 @@ int main(void)
         cmocka_unit_test(csv_fields_are_quoted_where_they_must_be),
         cmocka_unit_test(a_colour_is_three_octets),
         cmocka_unit_test(a_ready_line_goes_to_its_descriptor),
+        cmocka_unit_test(a_ready_line_without_a_free_descriptor),
     };
     return cmocka_run_group_tests_name("app", tests, NULL, NULL);
 }
