@@ -299,18 +299,19 @@ static const char *name_of(const char *path)
     return strcmp(path, "-") == 0 ? "standard output" : path;
 }
 
-int app_close_new(const char *path, FILE *out, struct sh_err *err)
+const char *app_write_failure(FILE *out)
 {
     errno = 0;
-    int failed = fflush(out) != 0 || ferror(out);
-    int why = errno;
-    if (out != stdout && fclose(out) != 0 && !failed) {
-        failed = 1;
-        why = errno;
-    }
-    if (!failed) return SH_OK;
-    /* A write that failed earlier has emptied the buffer, and its reason is lost. */
-    return sh_fail(err, SH_EIO, "%s: %s", name_of(path), why != 0 ? strerror(why) : "writing failed");
+    if (fflush(out) == 0 && !ferror(out)) return NULL;
+    if (errno == 0 && write(fileno(out), "\n", 1) == 1) errno = 0;
+    return errno != 0 ? strerror(errno) : "writing failed";
+}
+
+int app_close_new(const char *path, FILE *out, struct sh_err *err)
+{
+    const char *why = app_write_failure(out);
+    if (out != stdout && fclose(out) != 0 && why == NULL) why = strerror(errno);
+    return why == NULL ? SH_OK : sh_fail(err, SH_EIO, "%s: %s", name_of(path), why);
 }
 
 int app_write_json(const char *path, void (*put)(struct json *json, const void *ctx), const void *ctx,
@@ -324,8 +325,8 @@ int app_write_json(const char *path, void (*put)(struct json *json, const void *
     json_begin(&json, out);
     put(&json, ctx);
     const int ended = json_end(&json, &why);
-    rc = app_close_new(path, out, err);
-    return ended != SH_OK ? sh_fail(err, ended, "%s: %s", name_of(path), why.text) : rc;
+    rc = app_close_new(path, out, err); /* the reason, where writing has failed */
+    return rc == SH_OK && ended != SH_OK ? sh_fail(err, ended, "%s: %s", name_of(path), why.text) : rc;
 }
 
 int app_say_ready(long fd, void (*put)(struct json *json, const void *ctx), const void *ctx, struct sh_err *err)
@@ -340,7 +341,10 @@ int app_say_ready(long fd, void (*put)(struct json *json, const void *ctx), cons
     struct json json;
     json_begin_one_line(&json, out);
     put(&json, ctx);
-    int failed = json_end(&json, NULL) != SH_OK;
-    failed |= fclose(out) != 0;
-    return failed ? sh_fail(err, SH_EIO, "--ready-fd %ld: %s", fd, strerror(errno)) : SH_OK;
+    struct sh_err wrong = {0};
+    const int ended = json_end(&json, &wrong);
+    const char *why = app_write_failure(out);
+    if (fclose(out) != 0 && why == NULL) why = strerror(errno);
+    if (why == NULL && ended == SH_OK) return SH_OK;
+    return sh_fail(err, SH_EIO, "--ready-fd %ld: %s", fd, why != NULL ? why : wrong.text);
 }

@@ -111,6 +111,9 @@ void app_warn_empty(uint64_t pulses, uint64_t empty, uint64_t faint);
 
 /* Opens the file that a user names for output, empty; "-": standard output. */
 int app_open_new(const char *path, FILE **out, struct sh_err *err);
+/* Returns why writing to a stream of a descriptor failed; NULL: it did not. Where an earlier write failed, its errno is
+ * gone. So one more byte is written, which fails for the same reason. */
+const char *app_write_failure(FILE *out);
 /* Closes a file that was written, but not standard output. Returns the first error in writing it; its text begins with
  * the path, or with "standard output". */
 int app_close_new(const char *path, FILE *out, struct sh_err *err);

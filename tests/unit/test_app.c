@@ -2,6 +2,8 @@
 /* All commands share these: messages and exit statuses, endings of files, and files that a user names for output. */
 #include "firmware_sim/app/app.h"
 
+#include <errno.h>
+#include <fcntl.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -266,6 +268,28 @@ static void a_ready_line_goes_to_its_descriptor(void **state)
     assert_non_null(strstr(err.text, "--ready-fd 9999: "));
 }
 
+/* The reason of an early failure, which stdio has forgotten by the end, is found again. */
+static void a_full_disk_is_the_reason(void **state)
+{
+    struct sh_err err = {0};
+    FILE *out;
+    (void)state;
+    for (int early = 0; early < 2; early++) {
+        assert_int_equal(app_open_new("/dev/full", &out, &err), SH_OK);
+        assert_null(app_write_failure(out));
+        fputs("text", out);
+        if (early) fflush(out);
+        errno = 0;
+        assert_int_equal(app_close_new("/dev/full", out, &err), SH_EIO);
+        assert_string_equal(err.text, "/dev/full: No space left on device");
+    }
+    assert_int_equal(app_write_json("/dev/full", put_one, &(int){7}, &err), SH_EIO);
+    assert_string_equal(err.text, "/dev/full: No space left on device");
+    const int fd = open("/dev/full", O_WRONLY | O_CLOEXEC);
+    assert_int_equal(app_say_ready(fd, put_one, &(int){7}, &err), SH_EIO);
+    assert_non_null(strstr(err.text, ": No space left on device"));
+}
+
 /* Without a free descriptor, one of its own gets the line all the same. A standard stream, which needs another, has the
  * system's reason, and the user's command was right. */
 static void a_ready_line_without_a_free_descriptor(void **state)
@@ -304,6 +328,7 @@ int main(void)
         cmocka_unit_test(a_colour_is_three_octets),
         cmocka_unit_test(a_ready_line_goes_to_its_descriptor),
         cmocka_unit_test(a_ready_line_without_a_free_descriptor),
+        cmocka_unit_test(a_full_disk_is_the_reason),
     };
     return cmocka_run_group_tests_name("app", tests, NULL, NULL);
 }
