@@ -475,7 +475,10 @@ IFC_FILES = $(addprefix node_modules/web-ifc/,package.json LICENSE.md web-ifc-ap
 # BUILT=yes installs existing files, whatever flags they were built with and by whichever user.
 BUILT ?= no
 #? install           into PREFIX=/usr/local, below DESTDIR; BUILT=yes builds nothing
+install: export GIVEN_PREFIX = $(PREFIX)
 install: $(if $(filter yes,$(BUILT)),,all)
+	@case "$$GIVEN_PREFIX" in *[\"\$$\`\\\|\&\#[:cntrl:]]*) \
+		printf '%s\n' 'make install: PREFIX has a character of "$$`\|&# or a control character; all others are allowed' >&2; exit 1;; esac
 	install -d "$(DESTDIR)$(PREFIX)/bin" "$(DESTDIR)$(PREFIX)/$(LIB)" "$(DESTDIR)$(PREFIX)/include" "$(DESTDIR)$(HEADS_DIR)" \
 		"$(DESTDIR)$(SCENES_DIR)" "$(DESTDIR)$(FAULTS_DIR)" "$(DESTDIR)$(CAMPAIGN_DIR)" "$(DESTDIR)$(UDEV_DIR)" "$(DESTDIR)$(PC_DIR)" "$(DESTDIR)$(PREFIX)/share/scanhead/python" \
 		"$(DESTDIR)$(WIRESHARK_DIR)" "$(DESTDIR)$(UNIT_DIR)" "$(DESTDIR)$(COMPLETION_DIR)" \
@@ -496,7 +499,7 @@ install: $(if $(filter yes,$(BUILT)),,all)
 	if [ -n '$(IFC_BUILT)' ]; then (cd "$(IFC_BUILT)" && tar -cf - $(IFC_FILES)) | (cd "$(DESTDIR)$(IFC_DIR)" && tar --no-same-owner -xf -); \
 	else echo "without the readers of IFC, which npm did not install: Assimp reads it"; fi
 	install -m 644 drivers/host/70-scanhead.rules "$(DESTDIR)$(UDEV_DIR)/"
-	sed "s|@PREFIX@|$(PREFIX)|" config/packaging/scanhead@.service.in > "$(DESTDIR)$(UNIT_DIR)/scanhead@.service"
+	sed "s|@PREFIX@|$(subst %,%%,$(PREFIX))|" config/packaging/scanhead@.service.in > "$(DESTDIR)$(UNIT_DIR)/scanhead@.service"
 	pages=$$($(PRINTER) help --man list) && for p in $$pages; do \
 		$(PRINTER) help --man $$p > "$(DESTDIR)$(MAN_DIR)/man$${p##*.}/$$p" || exit; done
 	echo ".so man1/scanhead.1" > "$(DESTDIR)$(MAN_DIR)/man1/scanheadd.1"

@@ -24,6 +24,24 @@ static inline void date_of_days(int64_t days, int *year, int *month, int *day)
     *day = (int)(days - date_days(*year, *month, 1)) + 1;
 }
 
+/* A second of POSIX time as a date and a time of day. Not gmtime_r: in a time zone of the kind "right/" that of glibc
+ * takes leap seconds off. */
+struct date_time {
+    int year, month, day, hour, minute, second;
+};
+
+/* Returns 0 for a time before 1970 or after 9999. */
+static inline int date_of_posix(int64_t posix_s, struct date_time *out)
+{
+    const int64_t days = posix_s / 86400, s = posix_s % 86400;
+    if (posix_s < 0 || days >= date_days(10000, 1, 1)) return 0;
+    date_of_days(days, &out->year, &out->month, &out->day);
+    out->hour = (int)(s / 3600);
+    out->minute = (int)(s / 60 % 60);
+    out->second = (int)(s % 60);
+    return 1;
+}
+
 static inline int date_exists(int year, int month, int day)
 {
     const int next = month == 12;

@@ -394,7 +394,7 @@ void newfile_drop(const char *part, int fd)
 static int write_part(const char *path, int fd, newfile_put *put, const void *source, struct sh_err *err)
 {
     struct sh_err why = {0};
-    FILE *file = fdopen(dup(fd), "wb");
+    FILE *file = newfile_stream(fd, "wb");
     int rc = file != NULL ? SH_OK : sh_fail(&why, SH_EIO, "%s", strerror(errno));
     errno = 0;
     if (rc == SH_OK) rc = put(source, file, &why);

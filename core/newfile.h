@@ -13,6 +13,7 @@
 #define CORE_NEWFILE_H
 
 #include <stdio.h>
+#include <unistd.h>
 
 #include "core/err.h"
 
@@ -38,6 +39,14 @@ int newfile_write(const char *path, newfile_put *put, const void *source, struct
 /* The same for a file that newfile_append has opened as *fd. The new file is locked, too, and *fd becomes its
  * descriptor. SH_ESTATE: path no longer names the file of *fd. */
 int newfile_replace(const char *path, int *fd, newfile_put *put, const void *source, struct sh_err *err);
+/* A stream on a duplicate of fd, whose end leaves fd open. NULL: errno has the reason. */
+static inline FILE *newfile_stream(int fd, const char *mode)
+{
+    const int own = dup(fd);
+    FILE *file = own >= 0 ? fdopen(own, mode) : NULL;
+    if (file == NULL && own >= 0) close(own);
+    return file;
+}
 /* Before long work: checks whether newfile_part would make `path`, with `path`.part as its part. The check leaves no
  * file behind: a part that a killed writer has left is removed. */
 int newfile_check(const char *path, struct sh_err *err);

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 /* The command line of both programs: scanhead, and scanheadd (HEAD_ALONE), which is the head alone, for a board. */
-#include <errno.h>
 #include <fcntl.h>
 #include <malloc.h>
 #include <stdio.h>
@@ -164,13 +163,9 @@ int main(int argc, char **argv)
 #endif
     int status = check_stack();
     if (status == APP_OK) status = main_run(argc, argv);
-    errno = 0;
-    const int failed = fflush(stdout) != 0 || ferror(stdout) != 0;
-    if (failed && status == APP_OK) {
-        /* Where an earlier write failed, its errno is gone. So one more byte is written, which fails for the same
-         * reason. */
-        if (errno == 0 && write(STDOUT_FILENO, "\n", 1) == 1) errno = 0;
-        app_say("standard output: writing failed%s%s", errno != 0 ? ": " : "", errno != 0 ? strerror(errno) : "");
+    const char *why = app_write_failure(stdout);
+    if (why != NULL && status == APP_OK) {
+        app_say("standard output: %s", why);
         status = APP_FAILED;
     }
     app_end_messages();

@@ -24,6 +24,19 @@ blanks_stay() {
         grep -qF -e '-I/opt/scan\ head/include'
 }
 
+# systemd takes %h for the user's home, and %% for a percent sign. What the shell, sed or pkg-config would take for
+# something else is refused at once.
+odd_prefixes() {
+    mkdir "$work/odd" && install_it "$work/odd" "/opt/100%h" &&
+        grep -qxF 'ExecStart="/opt/100%%h/bin/scanhead" run /etc/scanhead/%i.yaml' \
+            "$work/odd/opt/100%h/lib/systemd/system/scanhead@.service" || return
+    for odd in '|' '&' '"' '`' '#' '\' '$$' "$(printf '\t')"; do
+        install_it "$work/refused" "/opt/a${odd}b" 2>"$work/said" && { echo "$odd is taken"; return 1; }
+        grep -qF 'make install: PREFIX has a character of "$`\|&#' "$work/said" && test ! -e "$work/refused" ||
+            { cat "$work/said"; return 1; }
+    done
+}
+
 config() {
     PKG_CONFIG_PATH=$work/root$prefix/lib/pkgconfig pkg-config --define-variable=prefix="$work/root$prefix" "$@" libscanhead
 }
@@ -72,6 +85,7 @@ END
 sed -n '/^```c /,/^```$/p' README.md | sed "/^\`\`\`/d" >"$work/client.c"
 check "make install" install_it "$work/root" "$prefix"
 check "make install into folders with blanks in their names" blanks_stay
+check "a prefix with a percent sign, and prefixes that are refused" odd_prefixes
 check "the udev rule is where udev looks below a prefix" test -s "$work/root$prefix/lib/udev/rules.d/70-scanhead.rules"
 check "the dissector for Wireshark is where its README says" cmp drivers/protocol/wireshark/scanhead.lua \
     "$work/root$prefix/share/scanhead/wireshark/scanhead.lua"

@@ -44,7 +44,7 @@ struct pty_link {
     struct pty_line line;
     int unplugged; /* there is no pair, and no symlink */
     int inotify, watch;
-    int is_deaf;                /* no new client can be seen: the next poll fails */
+    int deaf;                   /* errno: no new client can be seen, and the next poll fails; else 0 */
     int open;                   /* a session is on, as the caller knows or is about to learn */
     unsigned count;             /* clients of the session; 0 with open set: the last seems to be gone */
     int open_event_due;         /* a client is counted whose open event may be still to come */
@@ -206,7 +206,8 @@ static int pty_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
                             {.fd = pty->inotify, .events = POLLIN},
                             {.fd = pty->open ? pty->device.master : -1, .events = POLLIN}};
     if ((want_write & 1u) != 0 || pty->line.n_out != 0) fds[2].events |= POLLOUT;
-    if (pty->is_deaf || link_wait(fds, 3, events.n > 0 || !reported ? 0 : timeout_ms) != SH_OK) return SH_EIO;
+    if (pty->deaf != 0) errno = pty->deaf;
+    if (pty->deaf != 0 || link_wait(fds, 3, events.n > 0 || !reported ? 0 : timeout_ms) != SH_OK) return SH_EIO;
     link_take_wake(&fds[0], &events);
     if ((fds[1].revents & POLLIN) != 0) pty_read_inotify(pty, 1);
     if (!pty_report(pty, &events) || !pty->open || fds[2].fd < 0) return events.n;
@@ -270,8 +271,8 @@ static int pty_cut(struct pty_link *pty)
     if (!pty->open || pty_device_renew(&device) != SH_OK) return SH_ESTATE; /* the session goes on */
     pty_let_go(pty);
     pty_set_device(pty, &device);
-    pty->is_deaf = pty_wait_for_client(pty) != SH_OK;
-    return pty->is_deaf ? SH_ESTATE : SH_OK;
+    pty->deaf = pty_wait_for_client(pty) != SH_OK ? errno : 0;
+    return pty->deaf != 0 ? SH_ESTATE : SH_OK;
 }
 
 static int pty_unplug(struct pty_link *pty)

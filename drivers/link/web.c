@@ -12,9 +12,11 @@
  * address bar, and Origin, the page that asks. So a Host that is neither a number nor a name of this machine is
  * refused: it may be a name of the other site that leads here (DNS rebinding). An Origin that is not this link gets no
  * byte. Programs that aren't browsers have no Origin. */
+#include <fcntl.h>
 #include <libwebsockets.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/eventfd.h>
 #include <unistd.h>
 
 #include "drivers/link/web_inside.h"
@@ -58,6 +60,15 @@ static int open_context(struct web_link *web)
     return web->vhost != NULL ? 0 : -1;
 }
 
+/* The wake-up's place among the descriptors, from the start on: at the first poll there may be none left. The context
+ * closes it. */
+static struct lws *wait_for_owner(struct web_link *web)
+{
+    const int fd = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
+    web->wake_fd = -1;
+    return fd >= 0 ? web_wait_for(web, fd, NULL) : NULL;
+}
+
 static int web_open(const struct link_spec *spec, void **link, struct sh_err *err)
 {
     int rc = websockets_lib_load(&web_lws, err);
@@ -75,7 +86,8 @@ static int web_open(const struct link_spec *spec, void **link, struct sh_err *er
     web->n_sessions = spec->max_sessions;
     web->source = spec->web;
     if (open_context(web) == 0) web->listening = web_wait_for(web, web->listener.fd, NULL);
-    if (web->listening == NULL) {
+    if (web->listening != NULL) web->wake = wait_for_owner(web);
+    if (web->wake == NULL) {
         rc = sh_fail(err, SH_ENOMEM, "link web:%s: libwebsockets has too little memory or too few file descriptors",
                      web->listener.at);
         if (web->vhost == NULL) close(web->listener.fd);
@@ -239,14 +251,14 @@ static int web_callback(struct lws *wsi, enum lws_callback_reasons reason, void 
 
 /* ---- the owner's side */
 
-/* The owner gives the same descriptor to each poll, so it is taken once. */
+/* The owner gives the same descriptor to each poll, so it is taken once. It comes in place of that from open, which is
+ * why no new descriptor is needed. */
 static int take_wake_fd(struct web_link *web, int wake_fd)
 {
-    if (web->wake != NULL || wake_fd < 0) return SH_OK;
+    if (web->wake_fd >= 0 || wake_fd < 0) return SH_OK;
+    if (dup3(wake_fd, web_lws.lws_get_socket_fd(web->wake), O_CLOEXEC) < 0) return SH_EIO;
     web->wake_fd = wake_fd;
-    int fd = dup(wake_fd); /* the context closes it */
-    web->wake = fd >= 0 ? web_wait_for(web, fd, NULL) : NULL;
-    return web->wake != NULL ? SH_OK : SH_EIO;
+    return SH_OK;
 }
 
 static void report_session(struct web_session *s, int slot, uint32_t want_write, struct link_events *events)

@@ -8,16 +8,15 @@ enum { DAY_S = 86400, FIRST_YEAR = 1970, LAST_YEAR = 2199 };
 
 struct cola_date cola_date_of(int64_t ns)
 {
-    const int64_t t_ns = ns < 0 ? 0 : ns, t_s = t_ns / SECOND_NS;
-    const uint32_t s = (uint32_t)(t_s % DAY_S);
-    int year, month, day;
-    date_of_days(t_s / DAY_S, &year, &month, &day);
-    return (struct cola_date){.year = (uint32_t)year,
-                              .month = (uint32_t)month,
-                              .day = (uint32_t)day,
-                              .hour = s / 3600,
-                              .minute = s / 60 % 60,
-                              .second = s % 60,
+    const int64_t t_ns = ns < 0 ? 0 : ns;
+    struct date_time at = {0};
+    date_of_posix(t_ns / SECOND_NS, &at); /* 64 bits of nanoseconds end in 2262 */
+    return (struct cola_date){.year = (uint32_t)at.year,
+                              .month = (uint32_t)at.month,
+                              .day = (uint32_t)at.day,
+                              .hour = (uint32_t)at.hour,
+                              .minute = (uint32_t)at.minute,
+                              .second = (uint32_t)at.second,
                               .us = (uint32_t)(t_ns % SECOND_NS / 1000)};
 }
 

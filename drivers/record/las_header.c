@@ -3,9 +3,9 @@
 
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 
 #include "core/bytes.h"
+#include "core/date.h"
 
 enum {
     ENCODING_GPS_STANDARD = 1 << 0,
@@ -17,6 +17,8 @@ enum {
     EXTRA_HAS_NO_DATA = 1 << 0,
     EXTRA_HAS_SCALE = 1 << 3,
 };
+
+static const double MOST_S = 1e12; /* fits into an integer, and is after any date */
 
 static void put_text(uint8_t *to, size_t room, const char *text)
 {
@@ -152,11 +154,11 @@ static uint8_t *put_kinds(uint8_t *to, const struct las_waves *waves)
  * early. */
 static void put_date(uint8_t *to, const struct las_facts *f)
 {
-    struct tm day;
-    time_t unix_s = (time_t)(f->created_gps_s + ADJUSTED_S) + GPS_EPOCH_UNIX_S;
-    if (!f->gps_time || gmtime_r(&unix_s, &day) == NULL) return;
-    le_put16(to, (uint16_t)(day.tm_yday + 1));
-    le_put16(to + 2, (uint16_t)(day.tm_year + 1900));
+    struct date_time at;
+    const double posix_s = f->created_gps_s + ADJUSTED_S + GPS_EPOCH_UNIX_S;
+    if (!f->gps_time || !(posix_s >= 0.0 && posix_s < MOST_S) || !date_of_posix((int64_t)posix_s, &at)) return;
+    le_put16(to, (uint16_t)(date_days(at.year, at.month, at.day) - date_days(at.year, 1, 1) + 1));
+    le_put16(to + 2, (uint16_t)at.year);
 }
 
 static uint8_t format_of(const struct las_facts *f)

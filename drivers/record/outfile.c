@@ -165,6 +165,13 @@ int outfile_close(struct outfile *file, enum outfile_end how, struct sh_err *err
     return how == OUTFILE_LEAVE ? 0 : rc;
 }
 
+/* The file that a repair takes: where path is there, too, only the part's own name says which of the two is meant. */
+static const char *to_repair(const char *part, const char *path)
+{
+    struct stat st;
+    return lstat(path, &st) == 0 ? part : path;
+}
+
 int outfile_check_left(const char *part, const char *path, struct sh_err *err)
 {
     const long long len = newfile_left_len(part);
@@ -173,7 +180,7 @@ int outfile_check_left(const char *part, const char *path, struct sh_err *err)
         err, SH_EINPUT,
         "%s: an earlier recording left %lld bytes there; scanhead record --repair %s makes a complete file of them; "
         "or remove it",
-        part, len, path);
+        part, len, to_repair(part, path));
 }
 
 void outfile_say_left(const char *path, const struct sh_report *report)
@@ -183,7 +190,7 @@ void outfile_say_left(const char *path, const struct sh_report *report)
     if (newfile_left_len(part) > 0)
         sh_warn(report,
                 "%s keeps the data that reached the disk; scanhead record --repair %s makes a complete file of it",
-                part, path);
+                part, to_repair(part, path));
 }
 
 /* Returns whether file sizes are limited. Room is reserved far beyond the end of the file. Some file systems compare

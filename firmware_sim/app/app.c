@@ -290,18 +290,19 @@ static const char *name_of(const char *path)
     return strcmp(path, "-") == 0 ? "standard output" : path;
 }
 
-static int close_new(const char *path, FILE *out, struct sh_err *err)
+const char *app_write_failure(FILE *out)
 {
     errno = 0;
-    int failed = fflush(out) != 0 || ferror(out);
-    int why = errno;
-    if (out != stdout && fclose(out) != 0 && !failed) {
-        failed = 1;
-        why = errno;
-    }
-    if (!failed) return SH_OK;
-    /* A write that failed earlier has emptied the buffer, and its reason is lost. */
-    return sh_fail(err, SH_EIO, "%s: %s", name_of(path), why != 0 ? strerror(why) : "writing failed");
+    if (fflush(out) == 0 && !ferror(out)) return NULL;
+    if (errno == 0 && write(fileno(out), "\n", 1) == 1) errno = 0;
+    return errno != 0 ? strerror(errno) : "writing failed";
+}
+
+static int close_new(const char *path, FILE *out, struct sh_err *err)
+{
+    const char *why = app_write_failure(out);
+    if (out != stdout && fclose(out) != 0 && why == NULL) why = strerror(errno);
+    return why == NULL ? SH_OK : sh_fail(err, SH_EIO, "%s: %s", name_of(path), why);
 }
 
 int app_write_file(const char *path, void (*put)(FILE *out, const void *ctx), const void *ctx, struct sh_err *err)
@@ -324,8 +325,8 @@ int app_write_json(const char *path, void (*put)(struct json *json, const void *
     json_begin(&json, out);
     put(&json, ctx);
     const int ended = json_end(&json, &why);
-    rc = close_new(path, out, err);
-    return ended != SH_OK ? sh_fail(err, ended, "%s: %s", name_of(path), why.text) : rc;
+    rc = close_new(path, out, err); /* the reason, where writing has failed */
+    return rc == SH_OK && ended != SH_OK ? sh_fail(err, ended, "%s: %s", name_of(path), why.text) : rc;
 }
 
 int app_make_folder(const char *what, char *folder, size_t cap, struct sh_err *err)
@@ -344,14 +345,19 @@ int app_make_folder(const char *what, char *folder, size_t cap, struct sh_err *e
 int app_say_ready(long fd, void (*put)(struct json *json, const void *ctx), const void *ctx, struct sh_err *err)
 {
     if (fd == 0) return SH_OK;
-    FILE *out = fdopen(dup((int)fd), "w");
-    if (out == NULL) return sh_fail(err, SH_EINPUT, "--ready-fd %ld: %s", fd, strerror(errno));
+    /* Standard streams stay open: else the next file or session would get their numbers and the messages. */
+    FILE *out = fd > STDERR_FILENO ? fdopen((int)fd, "w") : newfile_stream((int)fd, "w");
+    if (out == NULL) {
+        const int is_theirs = errno == EBADF || errno == EINVAL; /* not open, or not for writing */
+        return sh_fail(err, is_theirs ? SH_EINPUT : SH_EIO, "--ready-fd %ld: %s", fd, strerror(errno));
+    }
     struct json json;
     json_begin_one_line(&json, out);
     put(&json, ctx);
-    int failed = json_end(&json, NULL) != SH_OK;
-    failed |= fclose(out) != 0;
-    /* Standard streams stay open: else the next file or session would get their numbers and the messages. */
-    if (fd > STDERR_FILENO) close((int)fd);
-    return failed ? sh_fail(err, SH_EIO, "--ready-fd %ld: %s", fd, strerror(errno)) : SH_OK;
+    struct sh_err wrong = {0};
+    const int ended = json_end(&json, &wrong);
+    const char *why = app_write_failure(out);
+    if (fclose(out) != 0 && why == NULL) why = strerror(errno);
+    if (why == NULL && ended == SH_OK) return SH_OK;
+    return sh_fail(err, SH_EIO, "--ready-fd %ld: %s", fd, why != NULL ? why : wrong.text);
 }

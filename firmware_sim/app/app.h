@@ -105,6 +105,10 @@ int app_is_recording(const char *path);
 /* Prints a warning where fewer than one pulse in twenty has an echo. */
 void app_warn_empty(uint64_t pulses, uint64_t empty, uint64_t faint);
 
+/* Returns why writing to a stream of a descriptor failed; NULL: it did not. Where an earlier write failed, its errno is
+ * gone. So one more byte is written, which fails for the same reason. */
+const char *app_write_failure(FILE *out);
+
 /* Writes the file that a user names for output anew, by `put`; path "-" is standard output, which stays open. Returns
  * the first error in writing; its text begins with the path, or with "standard output". */
 int app_write_file(const char *path, void (*put)(FILE *out, const void *ctx), const void *ctx, struct sh_err *err);

@@ -154,6 +154,6 @@ int json_end(struct json *json, struct sh_err *err)
         return sh_fail(err, SH_ESTATE, "json: keys, objects and arrays do not nest");
     errno = 0; /* only a failure of fflush sets errno again; the reason of an earlier failure is not known */
     if (fflush(json->out) != 0 || ferror(json->out))
-        return sh_fail(err, SH_EIO, "json: %s", errno != 0 ? strerror(errno) : "writing failed");
+        return sh_fail(err, SH_EIO, "%s", errno != 0 ? strerror(errno) : "writing failed");
     return SH_OK;
 }

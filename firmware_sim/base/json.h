@@ -38,7 +38,8 @@ void json_uint(struct json *json, const char *key, uint64_t value);
  * become null. */
 void json_double(struct json *json, const char *key, double value);
 void json_bool(struct json *json, const char *key, int value);
-/* Ends the text with a newline. SH_ESTATE: the calls did not make one whole value; SH_EIO: writing failed. */
+/* Ends the text with a newline. SH_ESTATE: the calls did not make one whole value; SH_EIO: writing failed, with the
+ * system's reason alone as text, since the caller knows the file. */
 int json_end(struct json *json, struct sh_err *err);
 
 #endif

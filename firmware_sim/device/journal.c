@@ -41,9 +41,12 @@ static void say_gap(char text[LINE_GAP_BYTES], const uint64_t lost[LINE_KINDS])
 /* The first line shows whether the file can be written at all, before anything runs. */
 static int write_title(int fd)
 {
-    const ssize_t n = write(fd, title, sizeof title - 1);
-    if (n == (ssize_t)sizeof title - 1) return 0;
-    return n < 0 ? errno : EIO;
+    for (size_t done = 0; done < sizeof title - 1;) { /* after a short write, the next one has the reason */
+        const ssize_t n = write(fd, title + done, sizeof title - 1 - done);
+        if (n < 0 && errno != EINTR) return errno;
+        if (n > 0) done += (size_t)n;
+    }
+    return 0;
 }
 
 struct journal *journal_open(const char *path, _Atomic uint64_t *lost, struct sh_err *err)

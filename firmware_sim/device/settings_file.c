@@ -238,12 +238,8 @@ static void settings_file_free(struct settings_file *file)
 
 static int read_from(struct settings_file *file, struct sh_err *err)
 {
-    const int fd = dup(file->fd);
-    FILE *in = fd >= 0 ? fdopen(fd, "r") : NULL;
-    if (in == NULL) {
-        if (fd >= 0) close(fd);
-        return sh_fail(err, SH_EIO, "%s: %s", file->path, strerror(errno));
-    }
+    FILE *in = newfile_stream(file->fd, "r");
+    if (in == NULL) return sh_fail(err, SH_EIO, "%s: %s", file->path, strerror(errno));
     const int rc = read_image(file, in, err);
     fclose(in);
     return rc;

@@ -61,7 +61,7 @@ static void cost_watch_warn(const struct cost_watch *watch, double ns)
     sh_warn(
         watch->loop->options.report,
         "%s: a pulse takes %.3g us of processor time, more than ten times the %.3g us that are planned, and the run "
-        "takes that much longer if casting is its slowest stage; %s",
+        "takes that much longer if casting is its slowest stage; possible causes: %s",
         watch->loop->cfg->file, 1e-3 * ns, 1e-3 * watch->figures.planned_ns, reason);
 }
 

@@ -2,6 +2,7 @@
 #include "firmware_sim/loop/pump.h"
 
 #include <errno.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/eventfd.h>
@@ -144,7 +145,7 @@ void pump_get_counts(const struct pump *pump, struct link_counts *counts)
     counts->lost_units += refused;
 }
 
-/* Keeps the error of the first link that failed to write; the run then fails. */
+/* Keeps the error of the first link that failed to write or to wait; the run then fails. */
 static void fail_link(struct pump *pump, const char *why)
 {
     struct links *links = pump->links;
@@ -194,10 +195,11 @@ static void handle(struct pump *pump, const struct link_event *event)
     }
 }
 
-/* Waits for events and handles them. Negative: poll failed. */
+/* Waits for events and handles them. Negative: poll failed; errno has the reason, or is 0. */
 static int take_events(struct pump *pump, uint32_t want_write, int timeout_ms)
 {
     struct link_event events[LINK_MAX_EVENTS];
+    errno = 0;
     int n = pump->ops->poll(pump->link, pump->wake_fd, want_write, timeout_ms, events, LINK_MAX_EVENTS);
     for (int i = 0; i < n; i++)
         handle(pump, &events[i]);
@@ -279,7 +281,9 @@ static int pump_turn(struct pump *pump, int most_ms)
     const int over = atomic_load(&pump->stream->over);
     if (over && !has_more(pump) && !pump->failed) return 0; /* LINK_CLOSED still brings a failed write's reason */
     if (take_events(pump, pump->want_write, timeout_ms(pump, over, most_ms)) < 0) {
-        sh_warn(pump->links->report, "link %s: poll failed; the link is given up", pump->ops->name);
+        char why[128];
+        snprintf(why, sizeof why, "the wait for its clients failed: %s", errno != 0 ? strerror(errno) : "no reason");
+        fail_link(pump, why);
         return 0;
     }
     pump->want_write = 0;

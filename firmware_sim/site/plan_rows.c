@@ -190,15 +190,18 @@ double site_planned_ns(const struct site *site)
 
 void site_cost_reason(const struct site *site, char *text, size_t room)
 {
+    static const uint64_t MANY_TRIANGLES = 32; /* fewer fill only some leaves of the BVH */
     const struct plan_methods *methods = &site->plan.methods;
     if (methods->beam != BEAM_SINGLE)
-        snprintf(text, room, "likely the sub-rays of footprints: beam.mode single has none");
+        snprintf(text, room, "the sub-rays of footprints (beam.mode single has none), a busy machine");
     else if (methods->depth > 0)
-        snprintf(text, room, "likely glass and mirrors: optics.depth 0 leaves them out");
+        snprintf(text, room, "glass and mirrors (optics.depth 0 leaves them out), a busy machine");
     else if (site->n_movers > 0)
-        snprintf(text, room, "likely the %u meshes that move, which are cast by themselves", site->n_movers);
+        snprintf(text, room, "meshes that move (%u, each cast by itself), a busy machine", site->n_movers);
+    else if (site->scene->n_triangles >= MANY_TRIANGLES)
+        snprintf(text, room, "triangles that lie over one another as seen from the head, a busy machine");
     else
-        snprintf(text, room, "likely many triangles that lie over one another as seen from the head");
+        snprintf(text, room, "a busy machine");
 }
 
 void site_plan_text(const struct site *site, char *text, size_t room)

@@ -11,7 +11,7 @@ int site_plan_rows(struct site *site, struct sh_err *err);
 /* Returns the processor time that the plan expects for a pulse, ns: the costs of its rows, and the work that each pulse
  * takes with any method (plan_pulse_ns). The figures are rounded: good enough to recognise an unusual cost. */
 double site_planned_ns(const struct site *site);
-/* Writes why a pulse may take far more than that, as far as the plan shows it, and what the user can do. */
+/* Writes possible causes of a pulse that takes far more than that, by the plan, and what the user can do. */
 void site_cost_reason(const struct site *site, char *text, size_t room);
 /* Writes the methods that a run uses, in one line. */
 void site_plan_text(const struct site *site, char *text, size_t room);

@@ -80,7 +80,7 @@ void scanhead_on_notice(struct scanhead *sh, void (*fn)(void *ctx, const struct 
 void scanhead_get_stats(const struct scanhead *sh, struct scanhead_stats *stats)
 {
     (void)sh;
-    *stats = (struct scanhead_stats){.frames = frames_in_stats, .reader_lost = reader_lost};
+    *stats = (struct scanhead_stats){.frames = frames_in_stats, .reader_lost = reader_lost, .dropped = 2 * reader_lost};
 }
 
 const char *scanhead_error(const struct scanhead *sh)

@@ -27,8 +27,9 @@ struct turn {
     void (*after)(void);
 };
 extern const struct turn *turns;
-extern uint64_t frames_in_stats, reader_lost; /* as the library counts them */
-extern uint64_t top;                          /* of the packets */
+/* As the library counts them. It drops twice as many frames as reader_lost. */
+extern uint64_t frames_in_stats, reader_lost;
+extern uint64_t top; /* of the packets */
 
 /* For cmocka: a soak without links, at 1000 ms. */
 int make_soak(void **state);

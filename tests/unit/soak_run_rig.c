@@ -235,6 +235,11 @@ void soak_conclude(struct soak *of)
     soak->n_failures = (uint32_t)is_bad;
 }
 
+void soak_warn_hidden(const struct soak *of, const struct sh_report *report)
+{
+    say(of == soak && report == &app_report_stderr ? "hidden " : "HIDDEN ");
+}
+
 void soak_print(const struct soak *of, FILE *out)
 {
     fprintf(out, "sheet of %.2f s\n", of->wall_s);

@@ -2,12 +2,15 @@
 /* All commands share these: messages and exit statuses, endings of files, and files that a user names for output. */
 #include "firmware_sim/app/app.h"
 
+#include <errno.h>
+#include <fcntl.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include <cmocka.h>
@@ -265,6 +268,54 @@ static void a_ready_line_goes_to_its_descriptor(void **state)
     assert_non_null(strstr(err.text, "--ready-fd 9999: "));
 }
 
+/* ctx: whether the text is written at once. */
+static void put_text(FILE *out, const void *ctx)
+{
+    const int *early = ctx;
+    assert_null(app_write_failure(out));
+    fputs("text", out);
+    if (*early) fflush(out);
+    errno = 0;
+}
+
+/* The reason of an early failure, which stdio has forgotten by the end, is found again. */
+static void a_full_disk_is_the_reason(void **state)
+{
+    struct sh_err err = {0};
+    (void)state;
+    for (int early = 0; early < 2; early++) {
+        assert_int_equal(app_write_file("/dev/full", put_text, &early, &err), SH_EIO);
+        assert_string_equal(err.text, "/dev/full: No space left on device");
+    }
+    assert_int_equal(app_write_json("/dev/full", put_one, &(int){7}, &err), SH_EIO);
+    assert_string_equal(err.text, "/dev/full: No space left on device");
+    const int fd = open("/dev/full", O_WRONLY | O_CLOEXEC);
+    assert_int_equal(app_say_ready(fd, put_one, &(int){7}, &err), SH_EIO);
+    assert_non_null(strstr(err.text, ": No space left on device"));
+}
+
+/* Without a free descriptor, one of its own gets the line all the same. A standard stream, which needs another, has the
+ * system's reason, and the user's command was right. */
+static void a_ready_line_without_a_free_descriptor(void **state)
+{
+    static const int seven = 7;
+    struct sh_err err = {0};
+    struct rlimit before, none;
+    int fd[2];
+    (void)state;
+    assert_int_equal(pipe(fd), 0);
+    assert_int_equal(getrlimit(RLIMIT_NOFILE, &before), 0);
+    none = before;
+    none.rlim_cur = 0;
+    assert_int_equal(setrlimit(RLIMIT_NOFILE, &none), 0);
+    const int to_stderr = app_say_ready(STDERR_FILENO, put_one, &seven, &err);
+    const int to_own = app_say_ready(fd[1], put_one, &seven, NULL);
+    assert_int_equal(setrlimit(RLIMIT_NOFILE, &before), 0);
+    assert_true(to_own == SH_OK && to_stderr == SH_EIO);
+    assert_string_equal(err.text, "--ready-fd 2: Too many open files");
+    close(fd[0]);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -280,6 +331,8 @@ int main(void)
         cmocka_unit_test(csv_fields_are_quoted_where_they_must_be),
         cmocka_unit_test(a_colour_is_three_octets),
         cmocka_unit_test(a_ready_line_goes_to_its_descriptor),
+        cmocka_unit_test(a_ready_line_without_a_free_descriptor),
+        cmocka_unit_test(a_full_disk_is_the_reason),
     };
     return cmocka_run_group_tests_name("app", tests, NULL, NULL);
 }

@@ -7,9 +7,11 @@
 #include <stdint.h>
 #include <cmocka.h>
 
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -204,6 +206,31 @@ static void test_other_lines(void **state)
     fclose(f);
 }
 
+/* A line that does not fit whole is taken back, and the reason is the system's. */
+static void a_line_that_does_not_fit(void **state)
+{
+    struct batch_file file[2];
+    const struct batch_entry good = an_entry(1, file);
+    struct rlimit before, few;
+    struct sh_err err;
+    int fd;
+    (void)state;
+    assert_int_equal(batch_manifest_open(dir, 3, 4, &fd, &err), SH_OK);
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &before), 0);
+    few = before;
+    few.rlim_cur = 10;
+    signal(SIGXFSZ, SIG_IGN);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &few), 0);
+    const int rc = batch_manifest_add(fd, &good, &err);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &before), 0);
+    signal(SIGXFSZ, SIG_DFL);
+    assert_int_equal(rc, SH_EIO);
+    assert_string_equal(err.text, "the manifest: cannot write: File too large");
+    assert_int_equal(lseek(fd, 0, SEEK_END), 0);
+    close(fd);
+    unlink(path_of("manifest-3-of-4.jsonl"));
+}
+
 /* ---- the files that a mesh names */
 
 static int list_name(void *ctx, const char *name, const char *path)
@@ -343,6 +370,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_inputs_of_other_scanners, make_dir, remove_dir),
         cmocka_unit_test_setup_teardown(test_torn, make_dir, remove_dir),
+        cmocka_unit_test_setup_teardown(a_line_that_does_not_fit, make_dir, remove_dir),
         cmocka_unit_test_setup_teardown(test_folder, make_dir, remove_dir),
         cmocka_unit_test_setup_teardown(test_other_lines, make_dir, remove_dir),
         cmocka_unit_test_setup_teardown(test_beside, make_dir, remove_dir),

@@ -326,6 +326,16 @@ static void a_full_disk_is_reported(void **ctx)
     assert_non_null(strstr(err.text, "/dev/full: No space left"));
     assert_null(journal_open("/nonexistent/j", NULL, &err));
     assert_non_null(strstr(err.text, "/nonexistent/j: cannot be opened for writing: No such file"));
+    /* The first line does not fit whole: what fits is written, and then the reason is known. */
+    struct rlimit all, few;
+    assert_int_equal(getrlimit(RLIMIT_FSIZE, &all), 0);
+    few = all;
+    few.rlim_cur = 4;
+    signal(SIGXFSZ, SIG_IGN);
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &few), 0);
+    assert_null(journal_open(path, NULL, &err));
+    assert_int_equal(setrlimit(RLIMIT_FSIZE, &all), 0);
+    assert_non_null(strstr(err.text, "j.txt: File too large"));
     /* The file may later grow to 100 bytes only, so the second of these lines does not fit. */
     struct rlimit before, small;
     assert_int_equal(getrlimit(RLIMIT_FSIZE, &before), 0);

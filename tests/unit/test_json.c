@@ -252,7 +252,7 @@ static void an_earlier_failure_gets_no_wrong_reason(void **ctx)
     assert_int_not_equal(fflush(file), 0);
     errno = ENOENT; /* of another call since then */
     assert_int_equal(json_end(&json, &err), SH_EIO);
-    assert_string_equal(err.text, "json: writing failed");
+    assert_string_equal(err.text, "writing failed");
     fclose(file);
 }
 

@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /* This compares the bytes before the points of a LAS file: the header and its records by the tables of LAS 1.2 and of
  * LAS 1.4 R15 (ASPRS), the keys of a CRS by OGC 19-008. */
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 #include <cmocka.h>
 
 #include "core/bytes.h"
@@ -14,6 +16,7 @@
 #include "drivers/record/las_header.h"
 #include "drivers/record/las_waves.h"
 #include "drivers/record/track.h"
+#include "tests/common/leap_zone.h"
 
 static struct track track;
 static struct las_waves waves;
@@ -144,6 +147,29 @@ static void test_all_of_1_4(void **state)
         le_put64(want + 255 + 8 * i, 6000000000 + (uint64_t)i);
     check(len);
     assert_int_equal(las_point_len(&facts), 44);
+}
+
+/* The date is the same in a time zone whose clocks count leap seconds, where gmtime is 27 s behind: the day before. */
+static void test_the_zone_does_not_matter(void **state)
+{
+    char path[] = "/tmp/scanhead_zone_XXXXXX";
+    (void)state;
+    begin(4);
+    facts.gps_time = 1;
+    facts.created_gps_s = 1709164800.0 - 315964800 - 1e9;
+    const int fd = mkstemp(path);
+    assert_true(fd >= 0 && close(fd) == 0);
+    assert_true(leap_zone_begin(path));
+    las_front(&facts, got);
+    leap_zone_end();
+    unlink(path);
+    assert_true(le_get16(got + 90) == 60 && le_get16(got + 92) == 2024);
+    static const double none[] = {-2e9, 1e300, -1e300, NAN}; /* 1946, and no time at all */
+    for (size_t i = 0; i < sizeof none / sizeof *none; i++) {
+        facts.created_gps_s = none[i];
+        las_front(&facts, got);
+        assert_true(le_get16(got + 90) == 0 && le_get16(got + 92) == 0);
+    }
 }
 
 /* Counts come when the points are known. Until the file is complete, its software says so. */
@@ -293,8 +319,13 @@ static void test_lengths_of_formats(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_all_of_1_4),  cmocka_unit_test(test_growing), cmocka_unit_test(test_waves),
-        cmocka_unit_test(test_keys_of_1_2), cmocka_unit_test(test_counts),  cmocka_unit_test(test_lengths_of_formats),
+        cmocka_unit_test(test_the_zone_does_not_matter),
+        cmocka_unit_test(test_all_of_1_4),
+        cmocka_unit_test(test_growing),
+        cmocka_unit_test(test_waves),
+        cmocka_unit_test(test_keys_of_1_2),
+        cmocka_unit_test(test_counts),
+        cmocka_unit_test(test_lengths_of_formats),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

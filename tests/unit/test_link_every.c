@@ -221,8 +221,21 @@ static void test_texts(void **state)
     expect_text(&missing, text);
 }
 
-/* The process has only a few descriptors left, from none to as many as it takes. The link opens, or says why not, and
- * then keeps nothing. */
+/* Whether one of the first polls reports the wake-up. */
+static int hears(const struct link_ops *ops, void *link, int wake)
+{
+    struct link_event events[LINK_MAX_EVENTS];
+    for (int turn = 0; turn < 3; turn++) {
+        const int n = ops->poll(link, wake, 0, 0, events, LINK_MAX_EVENTS);
+        for (int i = 0; i < n; i++)
+            if (events[i].kind == LINK_WOKEN) return 1;
+        if (n < 0) return 0;
+    }
+    return 0;
+}
+
+/* The process has only a few descriptors left, from none to as many as it takes. The link opens and then waits with its
+ * owner's wake-up, for which it needs no further one. Or it says why not, and keeps nothing. */
 static void test_few_descriptors(void **state)
 {
     enum { MOST = 16 };
@@ -235,6 +248,7 @@ static void test_few_descriptors(void **state)
     for (size_t i = 0; i < N_SPECS; i++) {
         const struct link_ops *ops = link_ops_get(specs[i].type);
         for (int left = 0; left <= MOST; left++) {
+            const int wake = eventfd(1, EFD_CLOEXEC | EFD_NONBLOCK);
             const int next = open("/dev/null", O_RDONLY | O_CLOEXEC);
             const struct rlimit few = {.rlim_cur = (rlim_t)(next + left), .rlim_max = before.rlim_max};
             struct sh_err err = {0, ""};
@@ -242,10 +256,13 @@ static void test_few_descriptors(void **state)
             close(next);
             assert_int_equal(setrlimit(RLIMIT_NOFILE, &few), 0);
             const int rc = ops->open(&specs[i], &link, &err);
+            const int is_woken = rc == SH_OK && hears(ops, link, wake);
             if (rc == SH_OK) ops->close(link);
             assert_int_equal(setrlimit(RLIMIT_NOFILE, &before), 0);
+            close(wake);
             if (rc != SH_OK && (err.text[0] == '\0' || strchr(err.text, '\n') != NULL))
                 fail_msg("%s: \"%s\" is no reason", ops->name, err.text);
+            if (rc == SH_OK && !is_woken) fail_msg("%s: no wake-up with %d descriptors left", ops->name, left);
             if (rc != SH_OK && left == MOST) fail_msg("%s: %s", ops->name, err.text);
             expect_open(&specs[i], err.text, &n_open);
         }

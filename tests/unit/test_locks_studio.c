@@ -36,9 +36,9 @@ static void a_soak_is_locked(void **state)
     TAKES(1, (soak_saw_inside(link, &event), 0));
     TAKES(1, (soak_saw_state(link, "boot"), 0));
     TAKES(1, soak_is_head_seen(link));
-    TAKES(1, (soak_saw_open(link), 0));
+    TAKES(2, (soak_saw_open(link), 0)); /* the link's lock, and the clean reader's */
     TAKES(1, (soak_saw_no_open(link), 0));
-    TAKES(2, (soak_saw_end(link), 0)); /* the link's lock, and the clean reader's */
+    TAKES(2, (soak_saw_end(link), 0)); /* the same two */
     TAKES(1, soak_clean_get(soak, FIRST, &frame));
     TAKES(1, soak_clean_top(soak));
     TAKES(1, soak_clean_t_ns(soak));

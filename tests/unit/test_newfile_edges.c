@@ -164,6 +164,35 @@ static void test_gap(void **state)
     assert_int_equal(lstat(path, &st), -1);
 }
 
+static int put_a_word(const void *source, FILE *file, struct sh_err *why)
+{
+    (void)source, (void)why;
+    fputs("word", file);
+    return SH_OK;
+}
+
+/* With ever fewer descriptors left, the file is written, or the reason is that there are too few. */
+static void test_few_descriptors(void **state)
+{
+    struct rlimit before;
+    int n_failed = 0, rc = -1;
+    (void)state;
+    assert_int_equal(getrlimit(RLIMIT_NOFILE, &before), 0);
+    for (int left = 0; rc != SH_OK; left++) {
+        const int next = open("/dev/null", O_RDONLY | O_CLOEXEC);
+        const struct rlimit few = {.rlim_cur = (rlim_t)(next + left), .rlim_max = before.rlim_max};
+        close(next);
+        assert_int_equal(setrlimit(RLIMIT_NOFILE, &few), 0);
+        rc = newfile_write(path, put_a_word, NULL, &err);
+        assert_int_equal(setrlimit(RLIMIT_NOFILE, &before), 0);
+        assert_true(left < 10);
+        n_failed += rc != SH_OK;
+        if (rc != SH_OK && strstr(err.text, "Too many open files") == NULL) fail_msg("%d left: %s", left, err.text);
+    }
+    assert_true(n_failed >= 2); /* the file itself, and the stream on it */
+    unlink(path);
+}
+
 static int set_up(void **state)
 {
     (void)state;
@@ -186,6 +215,7 @@ int main(void)
         cmocka_unit_test(test_redirected),
         cmocka_unit_test(test_without_locks),
         cmocka_unit_test(test_gap),
+        cmocka_unit_test(test_few_descriptors),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

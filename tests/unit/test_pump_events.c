@@ -3,6 +3,7 @@
  * messages, and failures. A client in memory lets the owner work turn by turn; the reports are those of the test. */
 #include "tests/unit/session_rig.h"
 
+#include <errno.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
 
@@ -20,7 +21,10 @@ static int own_poll(void *link, int wake_fd, uint32_t want_write, int timeout_ms
     assert_true(max > 0);
     asked_ms = timeout_ms;
     asked_write = want_write;
-    if (poll_fails) return SH_EIO;
+    if (poll_fails != 0) {
+        errno = poll_fails;
+        return SH_EIO;
+    }
     events[0] = event;
     const int n = has_event;
     has_event = 0;
@@ -180,9 +184,14 @@ static void a_poll_that_fails_ends_the_link(void **state)
 {
     (void)state;
     assert_int_equal(atomic_load(&links.n_busy), 1);
-    poll_fails = 1;
+    poll_fails = EMFILE;
     turn();
-    assert_string_equal(warned, "link own: poll failed; the link is given up");
+    assert_string_equal(warned,
+                        "link here: the wait for its clients failed: Too many open files; the rest of the stream "
+                        "is missing there");
+    assert_true(atomic_load(&links.failed) == 1 && links.error.code == SH_EIO); /* the run fails, too */
+    assert_string_equal(links.error.text,
+                        "link here: the wait for its clients failed: Too many open files; it is cut short");
     assert_true(memory.over == 1 && pump.is_done && atomic_load(&links.n_busy) == 0);
     turn(); /* does nothing more */
     assert_int_equal(n_warned, 1);

@@ -131,11 +131,18 @@ static void write_file(const char *path, const char *text)
     fclose(file);
 }
 
+enum { WARNING_LEN = 800 };
+
+static void keep_warning(void *ctx, const char *text)
+{
+    snprintf(ctx, WARNING_LEN, "%s", text);
+}
+
 /* Names: an ending that nobody writes, a recording that was left, and files that a repair must not touch. */
 static void test_names(void **state)
 {
     (void)state;
-    char path[128], part[140], want[800];
+    char path[128], part[140], want[800], got[WARNING_LEN];
     struct repaired file;
     snprintf(path, sizeof path, "%s", rig_path("a.ply"));
     snprintf(part, sizeof part, "%s.part", path);
@@ -154,6 +161,18 @@ static void test_names(void **state)
     snprintf(want, sizeof want, "%s: is not a PLY file of points, or too short to tell; it is unchanged", part);
     assert_string_equal(err.text, want);
     write_file(path, "another");
+    assert_int_not_equal(outfile_check_left(part, path, &err), SH_OK); /* the command that it names has to do */
+    snprintf(want, sizeof want,
+             "%s: an earlier recording left 7 bytes there; scanhead record --repair %s makes a complete file of them; "
+             "or remove it",
+             part, part);
+    assert_string_equal(err.text, want);
+    outfile_say_left(path, &(struct sh_report){.ctx = got, .warn = keep_warning});
+    snprintf(want, sizeof want,
+             "%s keeps the data that reached the disk; scanhead record --repair %s makes a complete file of it", part,
+             part);
+    assert_string_equal(got, want);
+    assert_int_equal(repair_file(part, NULL, &file, &err), SH_EFORMAT); /* and not SH_ESTATE */
     assert_int_equal(repair_file(path, NULL, &file, &err), SH_ESTATE);
     snprintf(want, sizeof want,
              "%s: both this file and %s exist; give %s to repair it (it keeps its name), or move %s away", path, part,

@@ -13,11 +13,12 @@
 #include "firmware_sim/app/studio/record/offline.h"
 #include "firmware_sim/app/studio/soak/clean.h"
 #include "firmware_sim/app/studio/soak/soak.h"
+#include "firmware_sim/base/clock.h"
 
 static struct soak *soak;
 static struct scanhead *const handle = (struct scanhead *)&soak;
 static const struct scanhead_frame *frames; /* a type of 0 ends them; of -1: nothing came */
-static int n_next, connect_rc, n_closed, hashes, n_asked, answers;
+static int n_next, connect_rc, n_closed, hashes, n_asked, answers, n_sleeps, n_next_in_sleep;
 
 int offline_connect(const char *who, struct link_spec *link, struct scanhead **sh, struct sh_err *err)
 {
@@ -68,6 +69,19 @@ void scanhead_get_stats(const struct scanhead *sh, struct scanhead_stats *stats)
 void scanhead_close(struct scanhead *sh)
 {
     n_closed += sh == handle;
+}
+
+int64_t clock_now_ns(void)
+{
+    return 1;
+}
+
+/* The reader sleeps only while a client is far behind. At the third time the client has caught up. */
+void clock_sleep_until_ns(int64_t t_ns)
+{
+    (void)t_ns;
+    n_next_in_sleep += n_next;
+    if (++n_sleeps == 3) soak->link[0].reached = soak->clean.top;
 }
 
 static int make(void **state)
@@ -145,6 +159,26 @@ static void the_end_of_a_soak(void **state)
     assert_string_equal(soak->clean.failed, "");
 }
 
+/* While a client is far behind, the reader reads nothing, but asks where that is wanted. */
+static void a_client_far_behind(void **state)
+{
+    static uint8_t raw[32];
+    const struct scanhead_frame all[] = {
+        {.type = SCANHEAD_POINTS, .seq = 7, .t_ns = 100, .raw = raw, .raw_len = (32 << 20) + 1},
+        {.type = SCANHEAD_POINTS, .seq = 8, .t_ns = 200, .raw = raw, .raw_len = 32},
+        {0}};
+    struct soak_link *link = &soak->link[0];
+    (void)state;
+    pthread_mutex_init(&link->lock, NULL);
+    link->usable = link->is_open = 1;
+    soak->n_links = 1;
+    atomic_store(&soak->clean.want_health, 1);
+    n_sleeps = n_next_in_sleep = 0;
+    read_all(all);
+    assert_true(n_sleeps == 3 && n_next_in_sleep == 3 && soak->clean.frames == 2);
+    assert_true(n_asked == 2 && soak->clean.bytes == (32 << 20) + 33);
+}
+
 /* It asks once, when the soak wants it. Without an answer the text is empty. */
 static void the_heads_answers(void **state)
 {
@@ -189,6 +223,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(frames_are_kept, make, end),
         cmocka_unit_test_setup_teardown(the_end_of_a_soak, make, end),
+        cmocka_unit_test_setup_teardown(a_client_far_behind, make, end),
         cmocka_unit_test_setup_teardown(the_heads_answers, make, end),
         cmocka_unit_test_setup_teardown(numbers, make, end),
     };

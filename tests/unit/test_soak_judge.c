@@ -7,7 +7,9 @@
 #include <cmocka.h>
 
 #include "drivers/protocol/native.h"
+#include "firmware_sim/app/studio/soak/frame.h"
 #include "firmware_sim/app/studio/soak/head.h"
+#include "firmware_sim/app/studio/soak/judge.h"
 #include "firmware_sim/app/studio/soak/row.h"
 #include "tests/unit/soak_rig.h"
 
@@ -246,6 +248,59 @@ static void test_boots(void **state)
         }
 }
 
+/* Reports of the board and of the library come before the client reads the frame. They judge no frame that the client
+ * has still to read. A report that finds no room in the ledger, which is half of it ahead, makes the verdict bad. */
+static void test_a_client_that_lags(void **state)
+{
+    (void)state;
+    for (int too_far = 0; too_far < 2; too_far++) {
+        const uint32_t ahead = HIT - 1 + SOAK_RING / 2 - !too_far; /* the client has read HIT - 1 last */
+        struct soak *soak = soak_rig_make();
+        struct soak_link *link = &soak->link[0];
+        struct soak_row *row = inject(soak, FAULT_DROP, 0, 0, "");
+        struct fault_note note = note_of(FAULT_DROP, 0, 0, "");
+        note.seq = ahead;
+        soak_heard(soak, &note);
+        notice(soak, SCANHEAD_NOTICE_GAP, ahead + 1 - !too_far, 1); /* the library is as far ahead */
+        notice(soak, SCANHEAD_NOTICE_GAP, HIT, 1);
+        assert_int_equal(link->too_far, 2 * too_far);
+        assert_int_equal(finish(soak), too_far);
+        if (too_far)
+            assert_string_equal(soak->failures[0],
+                                "a client was too far behind the head, so not all could be compared");
+        assert_true(row->injected == 2 && row->noticed == 1 && row->hidden == 1 && row->missed == 0);
+        assert_string_equal(row->why, too_far ? "the client was too far behind it" : "it was the last before the end");
+        assert_true(link->frames == N_FRAMES - 1 && link->lost_plain == 0 && link->unknown == 0);
+        soak_rig_end(soak);
+    }
+}
+
+/* Without a session the head does not wait, and the next session begins anywhere. Its faults find room. */
+static void test_a_session_far_on(void **state)
+{
+    enum { FAR = HIT + 3 * SOAK_RING };
+    (void)state;
+    struct soak *soak = soak_rig_make();
+    struct soak_link *link = &soak->link[0];
+    struct fault_note note = note_of(FAULT_DROP, 0, 0, "");
+    struct soak_row *row = inject(soak, FAULT_DISCONNECT, 0, 0, "");
+    soak_saw_end(link);
+    note.seq = FAR; /* the head may write before the client knows that it has a connection */
+    soak_heard(soak, &note);
+    soak->clean.top = soak_seq_of(soak, FAR);
+    soak_saw_open(link);
+    note.seq = FAR + 2;
+    soak_heard(soak, &note);
+    see(soak, FAR + 1, 0, 0.0);
+    notice(soak, SCANHEAD_NOTICE_GAP, FAR + 2, 1);
+    see(soak, FAR + 3, 0, 0.0);
+    soak_judge(link, 1);
+    assert_true(link->too_far == 0 && row->noticed == 1 && link->lost_plain == 0);
+    assert_true(link->row[FAULT_DROP].noticed == 1 && link->row[FAULT_DROP].hidden == 1);
+    assert_string_equal(link->row[FAULT_DROP].why, "there was no session then");
+    soak_rig_end(soak);
+}
+
 /* The numbers on the wire wrap; those of the ledger go on. */
 static void test_numbers_wrap(void **state)
 {
@@ -269,6 +324,8 @@ int main(void)
         cmocka_unit_test(test_connections),
         cmocka_unit_test(test_faults_without_a_session),
         cmocka_unit_test(test_boots),
+        cmocka_unit_test(test_a_client_that_lags),
+        cmocka_unit_test(test_a_session_far_on),
         cmocka_unit_test(test_numbers_wrap),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -23,7 +23,7 @@ static int go_there(void **state)
 }
 
 #define OPENED "patience site sights device clean loop clients listen run read connect "
-#define CLOSED "join free_loop join_clients join_clean journal judge0 head0 judge1 head1 conclude:71 "
+#define CLOSED "join free_loop join_clients join_clean journal judge0 head0 judge1 head1 conclude:71 hidden "
 #define FREED  "close_clients close_clean free_device free_site"
 
 static void expect(const char *words, int status, const char *expected)
@@ -94,6 +94,7 @@ static void device_time(void **state)
     (void)state;
     does(&app_soak, "c.yaml --duration 2 --quiet --pace fast", 0);
     has(trace, "no_faults@240 ");
+    assert_null(strstr(trace, "patience ")); /* the head waits for its readers */
 }
 
 static void progress(void **state)

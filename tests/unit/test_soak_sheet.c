@@ -41,6 +41,8 @@ static void fill(void)
                            .closings = 46,
                            .away = 47,
                            .reader_lost = 48,
+                           .dropped = 58,
+                           .too_far = 59,
                            .lost_plain = 49,
                            .wrong_plain = 50,
                            .unknown = 51,
@@ -83,7 +85,8 @@ static void each_key(void **state)
              "{\"fault\":\"flip, resealed\",\"injected\":21,\"noticed\":0,\"hidden\":21,\"missed\":0,\"lost\":0,"
              "\"wrongly_accepted\":0,\"hidden_because\":\"no checksum shows it\"}],"
              "\"frames\":41,\"bytes\":42,\"bad_bytes\":43,\"refused_frames\":44,\"sessions\":45,\"closed\":46,"
-             "\"away_frames\":47,\"reader_lost_frames\":48,\"lost_without_fault\":49,\"wrong_without_fault\":50,"
+             "\"away_frames\":47,\"reader_lost_frames\":48,\"dropped_frames\":58,\"reports_too_far_ahead\":59,"
+             "\"lost_without_fault\":49,\"wrong_without_fault\":50,"
              "\"not_compared\":51,\"questions\":52,\"right_answers\":53,\"timeouts\":54,\"wrong_answers\":55,"
              "\"replies_hurt_beside_frames\":56,\"replies_wrong_without_fault\":57,\"gave_up\":\"no head\"},"
              "{\"link\":2,\"type\":\"null\",\"endpoint\":\"\",\"not_soaked\":\"nobody reads it\",\"faults\":["
@@ -113,7 +116,7 @@ static void each_line(void **state)
         "13 can't be noticed: it was at the end\n"
         "1 tcp                  flip, resealed         21        -        0        0  no checksum shows it\n"
         "1 tcp                  41 frames in 45 sessions, 52 questions; 47 frames came while there was no session; "
-        "48 left out, the client was too slow; 56 replies were lost or wrong beside another fault, or just "
+        "48 left out, the client was too slow; 58 dropped by its library; 59 reports were too far ahead of it; 56 replies were lost or wrong beside another fault, or just "
         "after a session; 51 frames the clean reader did not get; gave up: no head\n"
         "2 null                 %-16s       31       31       32        0  \n"
         "2 null                 not soaked: nobody reads it\n"
@@ -194,6 +197,7 @@ static void limits_are_good(void **state)
     make_good();
     soak.link[1].usable = soak.link[1].in_session = 0;
     soak.link[1].frames = soak.link[1].bad_bytes = 0;
+    soak.link[0].unknown = soak.clean.reader_lost = 6; /* the clean reader lost these */
     soak_conclude(&soak);
     if (soak.n_failures != 0) fail_msg("%s", soak.failures[0]);
     assert_true(soak.healthy && soak.hash_is_same);
@@ -212,6 +216,23 @@ static void differ(struct soak_link *link)
 static void lose(struct soak_link *link)
 {
     link->lost_plain = link->reader_lost + 1;
+}
+
+/* Each dropped frame counts as lost, but has a reason of its own. */
+static void drop_in_the_library(struct soak_link *link)
+{
+    link->dropped = 2;
+    link->lost_plain = link->reader_lost + 2;
+}
+
+static void lag_behind_reports(struct soak_link *link)
+{
+    link->too_far = 1;
+}
+
+static void lag_behind_the_clean_reader(struct soak_link *link)
+{
+    link->unknown = soak.clean.reader_lost + 1;
 }
 
 static void answer_oddly(struct soak_link *link)
@@ -297,6 +318,9 @@ static const struct {
     {give_up, "a client gave up"},
     {differ, "a frame that was accepted differs from the clean one, without a fault"},
     {lose, "frames were lost without a fault"},
+    {drop_in_the_library, "a client's library dropped frames while the client waited for a reply"},
+    {lag_behind_reports, "a client was too far behind the head, so not all could be compared"},
+    {lag_behind_the_clean_reader, "a client was too far behind the head, so not all could be compared"},
     {answer_oddly, "a reply was wrong or missing without a fault"},
     {be_closed, "a connection was closed without a fault"},
     {get_nothing, "a client got no frame"},
@@ -344,6 +368,35 @@ static void each_reason_is_enough(void **state)
     assert_int_equal(soak.n_failures, 0);
 }
 
+static void keep_warning(void *ctx, const char *text)
+{
+    snprintf(ctx, 256, "%s", text);
+}
+
+/* From 90 % hidden ones on, a warning says how many they are; the verdict is good all the same. */
+static void hidden_faults_are_named(void **state)
+{
+    static const struct {
+        uint64_t injected, hidden;
+        const char *warning;
+    } rows[] = {{20, 18, "18 of 20 injected faults can't be noticed"}, {20, 17, NULL}, {9, 9, NULL}};
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        char said[256] = "";
+        const struct sh_report report = {.ctx = said, .warn = keep_warning};
+        const uint64_t n = rows[i].injected, hidden = rows[i].hidden;
+        make_good();
+        soak.link[0].row[FAULT_DROP] = (struct soak_row){.injected = n, .hidden = hidden, .noticed = n - hidden};
+        soak_conclude(&soak);
+        assert_int_equal(soak.n_failures, 0);
+        soak_warn_hidden(&soak, &report);
+        if (rows[i].warning == NULL)
+            assert_string_equal(said, "");
+        else
+            assert_non_null(strstr(said, rows[i].warning));
+    }
+}
+
 /* Acts, refusals and plugs that nobody noticed by the end are missed. */
 static void open_acts_are_missed(void **state)
 {
@@ -388,6 +441,7 @@ int main(void)
         cmocka_unit_test(progress),
         cmocka_unit_test(limits_are_good),
         cmocka_unit_test(each_reason_is_enough),
+        cmocka_unit_test(hidden_faults_are_named),
         cmocka_unit_test(open_acts_are_missed),
         cmocka_unit_test(left_out_frames_are_those_of_the_head),
     };

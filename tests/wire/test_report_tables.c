@@ -3,6 +3,7 @@
  * name of its group, and groups without points have no row. */
 #include <math.h>
 
+#include "tests/common/leap_zone.h"
 #include "tests/wire/report_rig.h"
 
 enum { LINE_LEN = 600 };
@@ -314,7 +315,9 @@ static void each_row_of_the_page_is_right(void **state)
     report_make(all);
     report_write(wire, all);
     snprintf(html, sizeof html, "%s", wire_path(wire, "page.html"));
+    assert_true(leap_zone_begin(wire_path(wire, "zone"))); /* the page has UTC in any zone */
     report_run(wire, (const char *const[]){"--html", html, NULL});
+    leap_zone_end();
     char *page = wire_read(html, NULL);
     has_cards(page, all);
     has_page_times(page, all);

@@ -129,7 +129,18 @@ static void put_entry(FILE *out, const struct batch_entry *entry)
     json_end(&json, NULL);
 }
 
-/* Writes the line in one call, so that no reader sees a part of it, except where the disk is full. */
+/* Returns 0, or the errno of the write that failed. One call writes all, so that no reader sees a part of the line,
+ * except where the disk is full. After such a short write, the next one has the reason. */
+static int write_line(int fd, const char *line, size_t len)
+{
+    for (size_t done = 0; done < len;) {
+        const ssize_t n = write(fd, line + done, len - done);
+        if (n < 0 && errno != EINTR) return errno;
+        if (n > 0) done += (size_t)n;
+    }
+    return fsync(fd) == 0 ? 0 : errno;
+}
+
 int batch_manifest_add(int fd, const struct batch_entry *entry, struct sh_err *err)
 {
     char *line = NULL;
@@ -140,10 +151,9 @@ int batch_manifest_add(int fd, const struct batch_entry *entry, struct sh_err *e
     int rc = fclose(out) == 0 ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory for a line of the manifest");
     if (rc == SH_OK) {
         const off_t before = lseek(fd, 0, SEEK_END);
-        const ssize_t n = write(fd, line, len);
-        const int is_short = n >= 0 && n != (ssize_t)len;
-        if (n != (ssize_t)len || fsync(fd) != 0) {
-            rc = sh_fail(err, SH_EIO, "the manifest: cannot write: %s", strerror(is_short ? ENOSPC : errno));
+        const int error = write_line(fd, line, len);
+        if (error != 0) {
+            rc = sh_fail(err, SH_EIO, "the manifest: cannot write: %s", strerror(error));
             if (ftruncate(fd, before) != 0) sh_fail(err, SH_EIO, "the manifest: cannot write: %s", strerror(errno));
         }
     }

@@ -129,7 +129,8 @@ static int show(struct coverage_run *r, struct sh_err *err)
     if (rc == SH_OK && r->o.stations > 0) rc = coverage_next_find(&r->finder, r->coverage, err);
     if (rc == SH_OK && r->o.stations > 0 && !r->json) coverage_next_print(&r->next, &r->result);
     if (rc == SH_OK && r->json) rc = app_write_json("-", put_all, r, err);
-    if (rc == SH_OK && fflush(stdout) != 0) rc = sh_fail(err, SH_EIO, "standard output: writing failed");
+    const char *why = app_write_failure(stdout);
+    if (rc == SH_OK && why != NULL) rc = sh_fail(err, SH_EIO, "standard output: %s", why);
     return rc;
 }
 

@@ -99,7 +99,7 @@ static int write_draft(const char *path, const char *draft, const struct init_te
 {
     int rc = newfile_part(path, draft, fd, err);
     if (rc != SH_OK) return rc;
-    FILE *out = fdopen(dup(*fd), "w");
+    FILE *out = newfile_stream(*fd, "w");
     if (out != NULL) init_write_text(text, out);
     int failed = out == NULL || ferror(out);
     if (out != NULL) failed |= fclose(out) != 0;

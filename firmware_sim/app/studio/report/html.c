@@ -5,6 +5,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/date.h"
 #include "core/newfile.h"
 #include "core/studio/picture.h"
 #include "firmware_sim/app/studio/report/page.h"
@@ -47,13 +48,16 @@ static void put_scanners(FILE *out, const struct report *r)
 static void put_top(FILE *out, const struct report *r)
 {
     char text[CONFIG_PATH_LEN + 64];
-    struct tm day;
+    struct date_time at;
     fputs("<h1>Scan report: ", out);
     picture_put_escaped(out, basename(r->cloud_path));
     fputs("</h1>\n<dl class=\"facts\">\n", out);
     put_fact(out, "Recording", r->cloud_path);
-    if (gmtime_r(&r->modified.tv_sec, &day) != NULL && strftime(text, sizeof text, "%Y-%m-%d %H:%M:%S UTC", &day) > 0)
+    if (date_of_posix(r->modified.tv_sec, &at)) {
+        snprintf(text, sizeof text, "%04d-%02d-%02d %02d:%02d:%02d UTC", at.year, at.month, at.day, at.hour, at.minute,
+                 at.second);
         put_fact(out, "Written", text);
+    }
     put_fact(out, "Configuration", r->cfg->file);
     for (uint32_t i = 0; i < r->cfg->scene.n_meshes; i++)
         put_fact(out, i == 0 ? "Scene" : "", r->cfg->scene.mesh[i].file);

@@ -15,7 +15,8 @@ static int write_all(struct report *r, struct sh_err *err)
     int rc = r->html_path != NULL ? report_write_html(r, err) : SH_OK;
     if (rc == SH_OK && r->json) rc = app_write_json("-", report_put_json, r, err);
     if (rc == SH_OK && !r->json) report_print_text(r);
-    if (rc == SH_OK && fflush(stdout) != 0) rc = sh_fail(err, SH_EIO, "standard output: writing failed");
+    const char *why = app_write_failure(stdout);
+    if (rc == SH_OK && why != NULL) rc = sh_fail(err, SH_EIO, "standard output: %s", why);
     if (rc != SH_OK || r->f.stats.beyond == 0) return rc;
     return sh_fail(err, SH_ESTATE, "%s: %zu of %zu points are farther than %g m from the scene", r->cloud_path,
                    r->f.stats.beyond, r->f.stats.points, r->tolerance_m);

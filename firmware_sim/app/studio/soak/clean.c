@@ -7,6 +7,7 @@
 #include "firmware_sim/app/studio/soak/clean.h"
 #include "firmware_sim/app/studio/record/offline.h"
 #include "firmware_sim/app/studio/soak/frame.h"
+#include "firmware_sim/app/studio/soak/hold.h"
 #include "firmware_sim/app/studio/soak/soak.h"
 
 enum { NEXT_MS = 50, REPLY_MS = 5000 };
@@ -30,8 +31,13 @@ static void clean_keep(struct soak *soak, const struct scanhead_frame *frame)
     const soak_seq seq = soak_seq_of(soak, frame->seq);
     atomic_store(&soak->base, seq);
     pthread_mutex_lock(&c->lock);
-    c->ring[seq % SOAK_RING] = (struct soak_clean_frame){
-        .seq = seq, .digest = soak_digest(frame), .t_ns = frame->t_ns, .len = (uint32_t)frame->raw_len, .there = 1};
+    c->bytes += frame->raw_len;
+    c->ring[seq % SOAK_RING] = (struct soak_clean_frame){.seq = seq,
+                                                         .digest = soak_digest(frame),
+                                                         .t_ns = frame->t_ns,
+                                                         .len = (uint32_t)frame->raw_len,
+                                                         .end_byte = c->bytes,
+                                                         .there = 1};
     c->top = seq;
     c->frames++;
     c->last_t_ns = frame->t_ns;
@@ -81,7 +87,9 @@ static void *read_clean(void *arg)
     int rc;
     while ((rc = scanhead_next(c->sh, &frame, NEXT_MS)) == SCANHEAD_OK || rc == SCANHEAD_ETIMEOUT) {
         if (rc == SCANHEAD_OK) clean_keep(soak, &frame);
-        if (atomic_load(&c->want_health) == 1) clean_ask(c);
+        do
+            if (atomic_load(&c->want_health) == 1) clean_ask(c);
+        while (soak_hold(soak));
     }
     if (atomic_load(&soak->phase) != SOAK_ENDS) snprintf(c->failed, sizeof c->failed, "%.255s", scanhead_error(c->sh));
     scanhead_hash_hex(c->sh, c->sha256);

@@ -19,7 +19,7 @@ struct soak_clean {
     pthread_mutex_t lock;
     struct soak_clean_frame *ring;
     soak_seq top; /* the last one */
-    uint64_t frames, points_frames;
+    uint64_t frames, points_frames, bytes;
     /* the thread's own */
     struct link_spec link;
     struct scanhead *sh;

@@ -278,6 +278,7 @@ void soak_clients_join(struct soak *soak)
         struct scanhead_stats stats;
         scanhead_get_stats(link->sh, &stats);
         link->reader_lost = stats.reader_lost;
+        link->dropped = stats.dropped;
     }
 }
 

@@ -16,6 +16,7 @@ struct soak_clean_frame {
     uint64_t digest;
     int64_t t_ns;
     uint32_t len;
+    uint64_t end_byte; /* of the clean stream, counted from its first frame on; not for datagrams */
     int there;
 };
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A frame is judged once thousands of later ones came, or at the end. Then nothing more will come of the frame, and the
- * clean reader has it. */
+/* A frame is judged once the client has read thousands of later ones, or at the end. Then nothing more will come of the
+ * frame, and the clean reader has it. */
 #include "firmware_sim/app/studio/soak/clean.h"
 #include "firmware_sim/app/studio/soak/datagrams.h"
 #include "firmware_sim/app/studio/soak/frame.h"
@@ -236,7 +236,7 @@ void soak_judge(struct soak_link *link, int all)
     if (link->judged == 0) return;
     for (; link->judged <= link->top; link->judged++) {
         const struct soak_fact *f = soak_fact_at(link, link->judged);
-        if (!all && link->judged + SOAK_RING / 2 > link->top) return;
+        if (!all && link->judged + SOAK_RING / 2 > link->reached) return;
         if (f != NULL)
             judge_frame(link, f);
         else if (link->begun && link->judged >= link->first && link->judged < link->last)

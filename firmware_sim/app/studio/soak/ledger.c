@@ -28,17 +28,28 @@ struct soak_fact *soak_fact_at(struct soak_link *link, soak_seq seq)
     return fact->there && fact->seq == seq ? fact : NULL;
 }
 
-/* The frame's entry, a new one where there is none. NULL: it was judged already. */
+/* The client has read the stream up to here. */
+static void reach(struct soak_link *link, soak_seq seq)
+{
+    if (seq <= link->reached) return;
+    link->reached = seq;
+    soak_judge(link, 0);
+}
+
+/* The frame's entry, a new one where there is none. NULL: it was judged already, or the client is too far behind it.
+ * The board and the library may report frames that the client has still to read. So in a session only the frames that
+ * the client reads move `reached`. */
 static struct soak_fact *touch(struct soak_link *link, soak_seq seq)
 {
     struct soak_fact *fact = soak_fact_at(link, seq);
     if (fact != NULL) return fact;
-    if (link->top != 0 && seq + SOAK_RING / 2 <= link->top) return NULL;
-    if (link->begun && seq < link->judged) return NULL;
-    if (seq > link->top) {
-        link->top = seq;
-        soak_judge(link, 0);
+    if (link->reached == 0 || !(link->is_open || link->in_session)) reach(link, seq);
+    if (seq + SOAK_RING / 2 <= link->reached || (link->begun && seq < link->judged)) return NULL;
+    if (seq >= link->reached + SOAK_RING / 2) {
+        link->too_far++;
+        return NULL;
     }
+    if (seq > link->top) link->top = seq;
     if (link->judged == 0 || (!link->begun && seq < link->judged)) link->judged = seq;
     fact = &link->fact[seq % SOAK_RING];
     *fact = (struct soak_fact){.seq = seq, .there = 1};
@@ -134,10 +145,11 @@ static void hit_frame(struct soak_link *link, const struct fault_note *note)
         soak_hide(row, 1, "the frame has no such byte: nothing was changed");
         return;
     }
+    const uint64_t too_far = link->too_far;
     struct soak_fact *fact =
         touch(link, link->datagrams != NULL ? soak_unit(note->number) : soak_seq_of(link->soak, note->seq));
     if (fact == NULL) {
-        soak_hide(row, 1, "it was seen too late");
+        soak_hide(row, 1, link->too_far != too_far ? "the client was too far behind it" : "it was seen too late");
         return;
     }
     fact->t_ns = note->t_ns;
@@ -239,6 +251,7 @@ void soak_saw_frame(struct soak_link *link, const struct scanhead_frame *frame, 
     pthread_mutex_lock(&link->lock);
     const soak_seq seq = soak_seq_of(link->soak, frame->seq);
     if (!link->begun) soak_head_begins(link, frame);
+    reach(link, seq);
     if (!link->in_session) ledger_begin(link, seq);
     if (link->refused_now != 0) mark_refused(link, seq);
     struct soak_fact *fact = touch(link, seq);
@@ -255,6 +268,7 @@ void soak_saw_frame(struct soak_link *link, const struct scanhead_frame *frame, 
 
 void soak_saw_unit(struct soak_link *link, soak_seq seq, uint64_t digest, uint32_t len)
 {
+    reach(link, seq);
     if (!link->begun) ledger_begin(link, seq);
     struct soak_fact *fact = touch(link, seq);
     if (fact == NULL) return;
@@ -325,6 +339,8 @@ void soak_saw_open(struct soak_link *link)
 {
     pthread_mutex_lock(&link->lock);
     link->sessions++;
+    link->is_open = 1;
+    reach(link, soak_clean_top(link->soak)); /* the session has no frame from before it, but for the last few */
     pthread_mutex_unlock(&link->lock);
 }
 
@@ -366,7 +382,7 @@ void soak_saw_end(struct soak_link *link)
 {
     pthread_mutex_lock(&link->lock);
     const int was_refused = !link->in_session;
-    link->in_session = 0;
+    link->in_session = link->is_open = 0;
     link->ask.ended_ns = clock_now_ns();
     link->closings++;
     /* The board reports a power cycle some ticks before power goes. The client may be far behind then, the clean reader

@@ -33,11 +33,17 @@ struct soak_link {
     struct soak_row row[SOAK_N_ROWS];
     struct soak_fact *fact;
     int begun, in_session;
+    int is_open;                       /* a connection is there, be it without a frame so far */
     soak_seq judged, first, last, top; /* next to be judged; first and last that were received; newest with an entry */
+    soak_seq reached;     /* the client has read up to here, or it had no session until then; 0: not known so far */
+    uint64_t too_far;     /* reports of frames that the client was too far behind */
+    soak_seq held_at;     /* `reached` when the clean reader began to wait for the client */
+    int64_t held_from_ns; /* clock, then; 0: it does not wait */
     uint64_t frames, bytes, refused_frames, sessions, closings;
     uint64_t refused_now;       /* frames since the last one that was taken */
     uint64_t lost_plain;        /* frames that are missing without a fault */
     uint64_t reader_lost;       /* frames that the head says it left out, since the client was too slow */
+    uint64_t dropped;           /* frames that the client's library dropped while it waited for a reply */
     uint64_t wrong_plain;       /* differ from the clean frame without a fault, or came twice */
     uint64_t unknown;           /* the clean reader did not get them */
     uint64_t odd_closings;      /* the connection was closed without a fault */

@@ -54,6 +54,12 @@ static int has_open_rows(const struct soak_row rows[SOAK_N_ROWS])
     return 0;
 }
 
+/* Frames that the clean reader itself lost can't be compared, either. */
+static int is_overrun(const struct soak *soak, const struct soak_link *link)
+{
+    return link->too_far != 0 || (link->datagrams == NULL && link->unknown > soak->clean.reader_lost);
+}
+
 static void conclude_link(struct soak *soak, struct soak_link *link)
 {
     const uint64_t bad = link->bad_bytes;
@@ -71,9 +77,11 @@ static void conclude_link(struct soak *soak, struct soak_link *link)
                "the counts of a fault do not add up: injected is not noticed + hidden + missed + accepted");
     if (!link->usable) return;
     sheet_fail(soak, link->failed[0] != '\0', "a client gave up");
+    sheet_fail(soak, link->dropped != 0, "a client's library dropped frames while the client waited for a reply");
+    sheet_fail(soak, is_overrun(soak, link), "a client was too far behind the head, so not all could be compared");
     sheet_fail(soak, sum.missed != 0, "a fault that can be noticed was not noticed");
     sheet_fail(soak, link->wrong_plain != 0, "a frame that was accepted differs from the clean one, without a fault");
-    sheet_fail(soak, link->lost_plain > link->reader_lost, "frames were lost without a fault");
+    sheet_fail(soak, link->lost_plain > link->reader_lost + link->dropped, "frames were lost without a fault");
     sheet_fail(soak, link->ask.odd != 0, "a reply was wrong or missing without a fault");
     sheet_fail(soak, link->odd_closings != 0, "a connection was closed without a fault");
     sheet_fail(soak, link->frames == 0, "a client got no frame");
@@ -95,6 +103,17 @@ void soak_conclude(struct soak *soak)
     sheet_fail(soak, soak->stats.have_hash && !soak->hash_is_same && soak->clean.reader_lost == 0,
                "the clean reader's hash is not that of the head");
     sheet_fail(soak, soak->stats.counters.lost_pulses != 0, "the head lost pulses");
+}
+
+void soak_warn_hidden(const struct soak *soak, const struct sh_report *report)
+{
+    static const uint64_t MANY = 10;
+    const struct soak_row sum = sum_of(soak);
+    if (sum.injected < MANY || 10 * sum.hidden < 9 * sum.injected) return;
+    sh_warn(report,
+            "soak: %" PRIu64 " of %" PRIu64 " injected faults can't be noticed, so the verdict says little; the table "
+            "has the reasons",
+            sum.hidden, sum.injected);
 }
 
 /* ---- text */
@@ -130,6 +149,8 @@ static void print_link(const struct soak_link *link, FILE *out)
             link->sessions, link->sessions == 1 ? "" : "s", link->ask.asked);
     if (link->away != 0) fprintf(out, "; %" PRIu64 " frames came while there was no session", link->away);
     if (link->reader_lost != 0) fprintf(out, "; %" PRIu64 " left out, the client was too slow", link->reader_lost);
+    if (link->dropped != 0) fprintf(out, "; %" PRIu64 " dropped by its library", link->dropped);
+    if (link->too_far != 0) fprintf(out, "; %" PRIu64 " reports were too far ahead of it", link->too_far);
     if (link->ask.hurt != 0)
         fprintf(out, "; %" PRIu64 " replies were lost or wrong beside another fault, or just after a session",
                 link->ask.hurt);
@@ -193,6 +214,8 @@ static void put_counts(struct json *json, const struct soak_link *link)
     json_uint(json, "closed", link->closings);
     json_uint(json, "away_frames", link->away);
     json_uint(json, "reader_lost_frames", link->reader_lost);
+    json_uint(json, "dropped_frames", link->dropped);
+    json_uint(json, "reports_too_far_ahead", link->too_far);
     json_uint(json, "lost_without_fault", link->lost_plain);
     json_uint(json, "wrong_without_fault", link->wrong_plain);
     json_uint(json, "not_compared", link->unknown);

@@ -156,6 +156,7 @@ static int soak_serve(const struct soak_options *o, struct soak *soak, struct so
 static int say_result(const struct soak_options *o, struct soak *soak, struct sh_err *err)
 {
     soak_conclude(soak);
+    soak_warn_hidden(soak, &app_report_stderr);
     soak_print(soak, verdicts_out(&o->verdicts));
     const int rc = o->verdicts.json != NULL ? app_write_json(o->verdicts.json, soak_put, soak, err) : SH_OK;
     if (rc != SH_OK || soak->n_failures == 0) return rc;
@@ -210,9 +211,9 @@ static int soak_head(struct config *cfg, void *ctx, struct sh_err *err)
     app_warn_settings_file(cfg, "a soak has the settings of the configuration");
     struct soak *soak = calloc(1, sizeof *soak);
     if (soak == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
-    verdict_be_patient(cfg);
     soak->cfg = cfg;
     soak->realtime = cfg->loop.pace == PACE_REALTIME;
+    if (soak->realtime) verdict_be_patient(cfg); /* at pace fast the head waits for readers, and queues stay short */
     soak->faults = cfg->faults;
     open_clean_links(cfg, soak, o);
     int rc = open_head(o, cfg, soak, &head, err);
