@@ -37,6 +37,7 @@ struct host_times {
     int have_scan_t0, have_gps;
     int64_t scan_t0_ns;        /* device time of the scan's start */
     int64_t gps_at_ns, gps_ns; /* a device time, and the GPS time that the head's clock had then */
+    uint32_t gps_seq;          /* the event that says so */
 };
 
 /* Notices that the parser does not give: about lines that nobody waits for, and about connections. */
@@ -67,9 +68,9 @@ struct scanhead {
 
     /* state that the stream has reported, up to the frame that was handed out last */
     int have_seq, have_descriptor, have_anchor, have_pulse;
-    uint32_t last_seq;      /* of a frame that is not LOCAL */
-    uint64_t last_repeated; /* how many frames were repeated up to it */
-    int told_alone;         /* a descriptor for this reader alone came after last_seq */
+    uint32_t last_seq;                   /* of a frame that is not LOCAL */
+    int told_alone;                      /* a descriptor for this reader alone came after last_seq */
+    uint32_t descriptor_seq, anchor_seq; /* frames that gave the descriptor and the anchor at hand */
     struct native_descriptor descriptor;
     struct native_emitter emitter; /* kind NATIVE_EMIT_LINE: none came after the descriptor */
     struct native_beam beam[NATIVE_MAX_BEAMS];

@@ -82,6 +82,11 @@ uint32_t rig_next_seq(void)
     return rig_seq++;
 }
 
+void rig_begin_sequence(void)
+{
+    rig_seq = 0;
+}
+
 /* Sends the frame in `out`, with the next number. */
 static void put_frame(int fd, size_t len)
 {
@@ -120,6 +125,22 @@ static struct scanhead *open_fd(int fd)
     snprintf(source, sizeof source, "fd:%d", fd);
     assert_int_equal(scanhead_open(source, &sh, err, sizeof err), 0);
     return sh;
+}
+
+int rig_write_recording(void)
+{
+    char path[] = "/tmp/scanhead-rig-XXXXXX";
+    const int fd = mkstemp(path);
+    assert_true(fd >= 0);
+    assert_int_equal(unlink(path), 0);
+    rig_begin_sequence();
+    return fd;
+}
+
+struct scanhead *rig_read_recording(int fd)
+{
+    assert_int_equal(lseek(fd, 0, SEEK_SET), 0);
+    return open_fd(fd);
 }
 
 struct scanhead *open_pair(int *head)

@@ -58,6 +58,7 @@ def misuse(path):
     late_answer()
     half_a_frame()
     dropped_frames()
+    alike(path + ".alike")
     whole_frame()
     print("refused")
 
@@ -187,19 +188,34 @@ def dropped_frames():
     scanhead._QUEUE_BYTES = most
 
 
-def alike():
-    """A new sequence begins with the frame that came last. The client drops it as repeated, and keeps its state."""
-    head, theirs = pair()
-    first, other = (framed(kind, 0, 0, b"", seq) for kind, seq in ((200, 6), (201, 5)))
-    theirs.sendall(first + first + other)
-    head.next_frame(5)
-    head.descriptor = {}
-    assert head.next_frame(5).seq == 5 and head.descriptor == {}
+def restarted():
+    """The state of a sequence is void for the next one: after a frame that came twice, and where the next one begins with
+    the last frame's own number."""
+    for kinds_and_numbers in (((200, 6), (200, 6), (201, 5)), ((200, 6), (201, 6))):
+        head, theirs = pair()
+        theirs.sendall(b"".join(framed(kind, 0, 0, b"", seq) for kind, seq in kinds_and_numbers))
+        head.next_frame(5)
+        head.descriptor, head.anchor, head._gps = {}, {}, (0, 0)
+        assert head.next_frame(5).type == 201 and head.descriptor is None and head.gps_time_ns(0) is None
+
+
+def alike(path):
+    """Two recordings are put together. The second begins with two frames of the first, which hold for it, too."""
+    with open(path, "wb") as file:
+        for kind, seq in ((200, 5), (201, 6), (202, 7), (200, 5), (201, 6), (203, 7), (204, 8)):
+            file.write(framed(kind, 0, 0, b"", seq))
+    for anchor_seq, has_anchor in ((6, True), (7, False), (4, False)):
+        head = scanhead.open(path)
+        assert [head.next_frame().type for _ in range(3)] == [200, 201, 202]
+        head.descriptor, head.anchor, head._descriptor_seq, head._anchor_seq = {}, {}, 5, anchor_seq
+        for kind in (203, 204):
+            assert head.next_frame().type == kind
+            assert head.descriptor == {} and (head.anchor == {}) == has_anchor, (anchor_seq, kind)
 
 
 def notices():
     """A live head's faults are noticed once each, at their byte, before the frame that follows them."""
-    alike()
+    restarted()
     said = []
     head, theirs = pair()
     head.on_notice = lambda n: said.append(tuple(n)[:4])
