@@ -157,8 +157,9 @@ struct scanhead_frame {
     char event_text[96];
 };
 
-/* Gets the next frame, in order. Frames with a wrong CRC, repeated frames, and frames that come after newer ones are
- * left out and counted, see scanhead_on_notice. */
+/* Gets the next frame, in order. Frames with a wrong CRC or wrong contents, repeated frames, and frames that come after
+ * newer ones are left out and counted, see scanhead_on_notice. SCANHEAD_EFORMAT: the stream has no frame, or begins with
+ * a frame of another version of the protocol; in the second case, the next call goes on after that frame. */
 int scanhead_next(struct scanhead *sh, struct scanhead_frame *frame, int timeout_ms);
 
 /* Notices about a stream, one for each event. Losses are counted in two independent ways:
@@ -201,6 +202,9 @@ enum scanhead_notice_kind {
     SCANHEAD_NOTICE_CLOSED = 11,
     /* scanhead_reattach has found the head again. */
     SCANHEAD_NOTICE_REATTACHED = 12,
+    /* A whole frame, in order, has contents that can't be right, or a version that this library does not read. It is not
+     * handed out. `why` says more. */
+    SCANHEAD_NOTICE_REFUSED = 13,
 };
 
 #define SCANHEAD_NO_TIME INT64_MIN
@@ -212,11 +216,13 @@ struct scanhead_notice {
     uint64_t n;       /* as the kind says; 1 for one frame */
     int64_t t_ns; /* device time of the frame concerned. For bytes, lines and connections: that of the last whole frame
                    * before, or SCANHEAD_NO_TIME */
+    const char *why; /* REFUSED: a line of text, valid until fn returns; else NULL */
 };
 
 /* fn gets each notice, from within scanhead_next, scanhead_command and scanhead_reattach, and in the order of the
  * stream: at_byte never falls. A notice comes before the frame that follows it in the stream. While a command waits for
- * its reply, frames that came earlier may still be kept for scanhead_next. On this handle fn may only call
+ * its reply, frames that came earlier may still be kept for scanhead_next; REFUSED comes when it is such a frame's turn,
+ * so its at_byte may be lower. On this handle fn may only call
  * scanhead_get_stats, which already counts the notice. NULL, as at first: no function. Counters go on either way. */
 void scanhead_on_notice(struct scanhead *sh, void (*fn)(void *ctx, const struct scanhead_notice *notice), void *ctx);
 /* Returns the kind in lower case, such as "bad payload"; "?" for another number. */
@@ -436,6 +442,7 @@ struct scanhead_stats { /* over all connections of the handle */
     /* Frames of bad_payload that no gap shows: before the first whole frame, before a restart, and after the last whole
      * frame. So seq_lost + bad_unseen frames are known to be lost on the way. */
     uint64_t bad_unseen;
+    uint64_t refused; /* frames with wrong contents or of another version; frames above counts them, too */
 };
 void scanhead_get_stats(const struct scanhead *sh, struct scanhead_stats *stats);
 

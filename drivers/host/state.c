@@ -244,10 +244,10 @@ static int (*const absorbers[])(struct scanhead *sh, const struct native_header 
 int host_absorb(struct scanhead *sh, const struct native_header *header, const uint8_t *payload)
 {
     absorb_hash(sh, header, payload);
+    follow_sequence(sh, header);
     if (header->version != NATIVE_VERSION)
         return sh_fail(&sh->err, SH_EFORMAT, "%s: the head speaks version %u of the protocol; this library reads %d",
                        sh->source.name, header->version, NATIVE_VERSION);
-    follow_sequence(sh, header);
     /* line end and telemetry change nothing; unknown types are for later readers */
     if (header->type >= sizeof absorbers / sizeof absorbers[0] || absorbers[header->type] == NULL) return 0;
     return absorbers[header->type](sh, header, payload);
@@ -393,6 +393,7 @@ void scanhead_get_stats(const struct scanhead *sh, struct scanhead_stats *stats)
         .unasked = sh->notices.unasked,
         .closed = sh->notices.closed,
         .reattached = sh->notices.reattached,
+        .refused = sh->notices.refused,
     };
 }
 

@@ -152,6 +152,28 @@ struct scanhead *open_pair(int *head)
     return open_fd(fd[1]);
 }
 
+static char refusal[256];
+
+static void note_refusal(void *ctx, const struct scanhead_notice *notice)
+{
+    (void)ctx;
+    if (notice->kind == SCANHEAD_NOTICE_REFUSED) snprintf(refusal, sizeof refusal, "%s", notice->why);
+}
+
+const char *expect_refused_frame(struct scanhead *sh)
+{
+    struct scanhead_frame f;
+    struct scanhead_stats before, after;
+    scanhead_get_stats(sh, &before);
+    scanhead_on_notice(sh, note_refusal, NULL);
+    const int rc = scanhead_next(sh, &f, 0);
+    scanhead_on_notice(sh, NULL, NULL);
+    scanhead_get_stats(sh, &after);
+    assert_true(rc == SCANHEAD_ETIMEOUT || rc == SCANHEAD_ECLOSED);
+    assert_int_equal(after.refused - before.refused, 1);
+    return refusal;
+}
+
 void expect_frame(struct scanhead *sh, int type, struct scanhead_frame *frame)
 {
     assert_int_equal(scanhead_next(sh, frame, WAIT_MS), 0);

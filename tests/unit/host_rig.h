@@ -55,6 +55,9 @@ struct scanhead *rig_read_recording(int fd);
 /* Opens a handle, and writes the head's end of its socket pair. */
 struct scanhead *open_pair(int *head);
 
+/* The frames that have come give one refusal, and nothing is handed out. Returns its reason. */
+const char *expect_refused_frame(struct scanhead *sh);
+
 void expect_frame(struct scanhead *sh, int type, struct scanhead_frame *frame);
 
 #endif

@@ -2,6 +2,7 @@
 """The Python client at one end of a socket pair, where the test is the head: wrong calls, replies that come late, frames
 that are hurt or missing. python_client.py runs these."""
 import contextlib
+import hashlib
 import io
 import os
 import socket
@@ -199,6 +200,18 @@ def restarted():
         assert head.next_frame(5).type == 201 and head.descriptor is None and head.gps_time_ns(0) is None
 
 
+def later_version():
+    """A frame of another version is refused, and the next one comes. The hash is over both, as COUNTS.md says."""
+    head, theirs = pair()
+    later = bytearray(framed(scanhead.LINE_END, 0, 3, b"abc", 0))
+    later[2] = 2
+    later[24:28] = struct.pack("<I", scanhead.crc32c(bytes(later[:24])))
+    theirs.sendall(bytes(later) + framed(200, 0, 0, b"", 1))
+    assert "version 2" in refused(head.next_frame, 5)
+    assert head.next_frame(5).seq == 1
+    assert head.stream_sha256() == hashlib.sha256(b"\x04\x03\0\0\0abc").hexdigest()
+
+
 def alike(path):
     """Two recordings are put together. The second begins with two frames of the first, which hold for it, too."""
     with open(path, "wb") as file:
@@ -216,6 +229,7 @@ def alike(path):
 def notices():
     """A live head's faults are noticed once each, at their byte, before the frame that follows them."""
     restarted()
+    later_version()
     said = []
     head, theirs = pair()
     head.on_notice = lambda n: said.append(tuple(n)[:4])

@@ -1428,12 +1428,12 @@ class Head:
         return self._absorb(frame)
 
     def _absorb(self, frame: Frame) -> Frame:
-        if frame.version != 1:
-            raise ScanheadError(f"the head speaks version {frame.version}; this client reads 1")
         if not frame.flags & (REPEAT | LOCAL) and frame.type in _HASHED:
             self._sha256.update(struct.pack("<BI", frame.type, len(frame.payload)))
             self._sha256.update(frame.payload)
         self._follow_sequence(frame)
+        if frame.version != 1:
+            raise ScanheadError(f"the head speaks version {frame.version}; this client reads 1")
         if frame.type in _UNPACK:
             frame = frame._replace(fields=_decode(frame.type, frame.payload))
         act = {DESCRIPTOR: self._absorb_descriptor, ANCHOR: self._absorb_anchor,

@@ -224,18 +224,6 @@ static void ledger_begin(struct soak_link *link, soak_seq seq)
     link->begun = link->in_session = 1;
 }
 
-/* The library gives no gap for frames that came and that it refused for their content. Marks them as missing here. */
-static void mark_refused(struct soak_link *link, soak_seq to)
-{
-    for (soak_seq seq = link->last + 1; seq < to && link->refused_now > 0; seq++) {
-        struct soak_fact *fact = touch(link, seq);
-        if (fact == NULL || fact->gap || fact->got != 0) continue;
-        fact->gap = 1;
-        link->refused_now--;
-    }
-    link->refused_now = 0;
-}
-
 static void take_offset(struct soak_link *link, int64_t after_ns)
 {
     if (!link->have_offset || after_ns < link->offset_ns) link->offset_ns = after_ns;
@@ -249,7 +237,6 @@ void soak_saw_frame(struct soak_link *link, const struct scanhead_frame *frame, 
     const soak_seq seq = soak_seq_of(link->soak, frame->seq);
     if (!link->begun) soak_head_begins(link, frame);
     if (!link->in_session) ledger_begin(link, seq);
-    if (link->refused_now != 0) mark_refused(link, seq);
     struct soak_fact *fact = touch(link, seq);
     link->frames++;
     link->bytes += frame->raw_len;
@@ -313,6 +300,15 @@ static void add_again(struct soak_link *link, const struct scanhead_notice *noti
         fact->repeated++;
 }
 
+/* The library gives no gap for a frame that came and that it refused for its contents. The frame is missing here. */
+static void add_refused(struct soak_link *link, const struct scanhead_notice *notice)
+{
+    link->refused_frames++;
+    if (!link->begun) return;
+    struct soak_fact *fact = touch(link, soak_seq_of(link->soak, notice->seq));
+    if (fact != NULL && fact->got == 0) fact->gap = 1;
+}
+
 void soak_saw_notice(void *ctx, const struct scanhead_notice *notice)
 {
     struct soak_link *link = ctx;
@@ -328,6 +324,9 @@ void soak_saw_notice(void *ctx, const struct scanhead_notice *notice)
     case SCANHEAD_NOTICE_BAD_PAYLOAD:
     case SCANHEAD_NOTICE_BAD_BYTES:
         add_run(link, notice);
+        break;
+    case SCANHEAD_NOTICE_REFUSED:
+        add_refused(link, notice);
         break;
     case SCANHEAD_NOTICE_ECHO:
         link->ask.echoes++;

@@ -35,7 +35,6 @@ struct soak_link {
     int begun, in_session;
     soak_seq judged, first, last, top; /* next to be judged; first and last that were received; newest with an entry */
     uint64_t frames, bytes, refused_frames, sessions, closings;
-    uint64_t refused_now;       /* frames since the last one that was taken */
     uint64_t lost_plain;        /* frames that are missing without a fault */
     uint64_t reader_lost;       /* frames that the head says it left out, since the client was too slow */
     uint64_t wrong_plain;       /* differ from the clean frame without a fault, or came twice */
