@@ -4,6 +4,7 @@ that are hurt or missing. python_client.py runs these."""
 import contextlib
 import hashlib
 import io
+import math
 import os
 import socket
 import struct
@@ -212,6 +213,21 @@ def later_version():
     assert head.stream_sha256() == hashlib.sha256(b"\x04\x03\0\0\0abc").hexdigest()
 
 
+def geoid_range():
+    """A range along the meridian, by its radius of curvature and the ellipsoidal height. With heights above the geoid the
+    47 m below it count, too: they are 15 mm of the range."""
+    record = struct.pack("<iiIhHI", 1800000, 0, 0, 0, 0, 0x11000000)
+    e2 = (2 - 1 / 298.257223563) / 298.257223563
+    for heights, height_m in ((0, 100.0), (1, 147.0)):
+        raw = scanhead._raw_columns(bytes(40) + record, 1)
+        points = scanhead._common(raw, 0, scanhead.GEO)
+        scanhead._geo_points(points, raw, {"crs": scanhead.CRS_GEODETIC, "moving": 0, "heights": heights,
+                                           "height_m": height_m, "anchor": (45.0, 13.0, 100.0),
+                                           "scale": (1e-8, 1e-8, 1e-3)})
+        radius_m = 6378137.0 * (1 - e2) / (1 - e2 * math.sin(math.radians(45.009))**2)**1.5 + height_m
+        assert abs(points.range_m[0] - math.radians(0.018) * radius_m) < 1e-3, (heights, points.range_m[0])
+
+
 def alike(path):
     """Two recordings are put together. The second begins with two frames of the first, which hold for it, too."""
     with open(path, "wb") as file:
@@ -230,6 +246,7 @@ def notices():
     """A live head's faults are noticed once each, at their byte, before the frame that follows them."""
     restarted()
     later_version()
+    geoid_range()
     said = []
     head, theirs = pair()
     head.on_notice = lambda n: said.append(tuple(n)[:4])

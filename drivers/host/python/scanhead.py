@@ -747,8 +747,10 @@ def _geo_points(p: Points, raw, a: Dict) -> None:
     if a["moving"] & 1:
         p.range_m = _column((_NAN for _ in range(len(p))), len(p))
     elif a["crs"] == CRS_GEODETIC:
-        home = geodetic_to_ecef(*a["anchor"])
-        p.range_m = _mapped(lambda *at: _distance(geodetic_to_ecef(*at), home), x, y, z)
+        lat_deg, lon_deg, height_m = a["anchor"]
+        geoid_m = a["height_m"] - height_m if a["heights"] == 1 else 0.0
+        home = geodetic_to_ecef(lat_deg, lon_deg, height_m + geoid_m)
+        p.range_m = _mapped(lambda lat, lon, h: _distance(geodetic_to_ecef(lat, lon, h + geoid_m), home), x, y, z)
     else:
         p.range_m = _mapped(_length, *d)
     p.x, p.y, p.z, p.range_m = (_empty_as_nan(c, p.echo_count) for c in (x, y, z, p.range_m))
