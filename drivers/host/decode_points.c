@@ -138,8 +138,8 @@ VEC_INLINE void geocentric(double lat_deg, double h, double *from_axis, double *
     *from_equator = (n * (1 - e2) + h) * s;
 }
 
-/* Ranges go from the anchor straight through space. Longitudes are relative to the anchor's meridian. The anchor has its
- * ellipsoidal height here. */
+/* Ranges go from the anchor straight through space. Longitudes are relative to the anchor's meridian. The anchor has
+ * its ellipsoidal height here. */
 VEC_CLONES static void set_geodetic_ranges(const struct block *restrict b, int n, const double anchor[3],
                                            const double scale[3], double *restrict range_m)
 {

@@ -261,6 +261,7 @@ static int hand_out(struct scanhead *sh, const uint8_t *raw, uint64_t at_byte, s
     if (header.type == NATIVE_WAVES) fill_waves(frame);
     if (header.type == NATIVE_EVENT) fill_event(frame);
     sh->payload = frame->payload;
+    sh->err.text[0] = '\0'; /* it may be of a frame that was left out */
     return SCANHEAD_OK;
 }
 

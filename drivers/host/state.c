@@ -67,9 +67,9 @@ static void forget(struct scanhead *sh)
     host_forget_poses(sh);
 }
 
-/* Whether a recording holds a second copy of this frame right before the present one. Recordings that were put one after
- * the other may begin with the same frames. The parser drops the second copies as repeated, up to the first frame that
- * differs. The state that comes from such a frame is that of the new sequence, too. */
+/* Whether a recording holds a second copy of frame `seq` right before the present one. Recordings that were put one
+ * after the other may begin with the same frames. The parser drops the second copies as repeated, up to the first frame
+ * that differs. The state that comes from such a frame is that of the new sequence, too. */
 static int came_again(const struct scanhead *sh, const struct native_header *header, uint32_t seq)
 {
     return sh->source.is_file && header->seq - 1 - seq < sh->parser.sequence.again;

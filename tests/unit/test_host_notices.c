@@ -277,6 +277,7 @@ static void test_refused(void **state)
     assert_int_equal(n_noticed, 2);
     expect_notice(0, SCANHEAD_NOTICE_REFUSED, EVENT, 1, 1);
     expect_notice(1, SCANHEAD_NOTICE_REFUSED, 2 * EVENT, 2, 1);
+    assert_string_equal(scanhead_error(sh), ""); /* a reason is no error of the call */
     assert_int_equal(noticed[1].t_ns, 12);
     assert_true(noticed_stats.frames == 3 && noticed_stats.refused == 2 && noticed_stats.seq_lost == 0);
     make_event(raw, 4); /* these come before a reply, and wait for their turn */
@@ -285,6 +286,7 @@ static void test_refused(void **state)
     memcpy(raw + 3 * EVENT, "7\r\n", 3);
     struct play p = {.fd = head, .turn = {{"PRR?", raw, 3 * EVENT + 3}}};
     assert_int_equal(command_played(sh, &p, "PRR?", reply, WAIT_MS), 0);
+    assert_string_equal(scanhead_error(sh), "");
     assert_int_equal(n_noticed, 2);
     for (uint32_t seq = 4; seq <= 6; seq += 2) {
         expect_frame(sh, SCANHEAD_EVENT, &f);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* libscanhead: its counts, hash and refusals of a stream. */
+#include <fcntl.h>
 #include <nettle/sha2.h>
 
 #include "tests/unit/host_rig.h"
@@ -258,6 +259,27 @@ static void test_any_start(void **state)
     scanhead_close(sh);
 }
 
+/* The handle does not wait on its descriptor, though a copy of it may belong to the caller. Once closed, the copy is as
+ * it was. */
+static void test_flags_of_a_copy(void **state)
+{
+    (void)state;
+    for (int blocks = 0; blocks <= 1; blocks++) {
+        int fd[2];
+        char source[32];
+        struct scanhead *sh;
+        assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | (blocks ? 0 : SOCK_NONBLOCK), 0, fd), 0);
+        const int copy = dup(fd[0]), before = fcntl(copy, F_GETFL);
+        snprintf(source, sizeof source, "fd:%d", fd[0]);
+        assert_int_equal(scanhead_open(source, &sh, NULL, 0), 0);
+        assert_int_equal(fcntl(copy, F_GETFL), before | O_NONBLOCK);
+        scanhead_close(sh);
+        assert_int_equal(fcntl(copy, F_GETFL), before);
+        close(copy);
+        close(fd[1]);
+    }
+}
+
 static void hash_frame(struct sha256_ctx *ctx, const uint8_t *frame, size_t len)
 {
     sha256_update(ctx, 1, frame + 1);
@@ -322,6 +344,7 @@ int main(void)
         cmocka_unit_test(test_any_start),
         cmocka_unit_test(test_hash),
         cmocka_unit_test(test_void_after_restart),
+        cmocka_unit_test(test_flags_of_a_copy),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -191,8 +191,8 @@ def dropped_frames():
 
 
 def restarted():
-    """The state of a sequence is void for the next one: after a frame that came twice, and where the next one begins with
-    the last frame's own number."""
+    """The state of a sequence is void for the next one: after a frame that came twice, and where the next one begins
+    with the last frame's own number."""
     for kinds_and_numbers in (((200, 6), (200, 6), (201, 5)), ((200, 6), (201, 6))):
         head, theirs = pair()
         theirs.sendall(b"".join(framed(kind, 0, 0, b"", seq) for kind, seq in kinds_and_numbers))

@@ -31,8 +31,8 @@ static void test_cut_and_bad_bytes(void **state)
     replay_same_file(wire, "out.shs", "bad.shs");
 }
 
-/* A whole frame in the middle has a version of later times. Each reader leaves out that frame alone: a replay, which says
- * so, and a recorder, whose recording is then not complete. */
+/* A whole frame in the middle has a version of later times. Each reader leaves out that frame alone: a replay, which
+ * says so, and a recorder, whose recording is then not complete. */
 static void test_another_version(void **state)
 {
     struct wire *wire = *state;

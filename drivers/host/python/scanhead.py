@@ -12,7 +12,8 @@
 
 The wire is described in drivers/protocol/PROTOCOL.md and its pages, section by section. Columns of
 points are numpy arrays where numpy is installed, else lists; the numbers are the same, to the last bit those
-of libscanhead. Units are in names: _m metres, _rad radians, _deg degrees, _ns nanoseconds, _db decibels.
+of libscanhead (range_m of geodetic points: to 2e-8 m). Units are in names: _m metres, _rad radians, _deg degrees,
+_ns nanoseconds, _db decibels.
 NaN: no value. Errors are exceptions. A Head belongs to one thread at a time.
 
 Memory is bounded: a frame and a chunk of bytes (128 KiB), 64 MiB of frames that came while a reply was awaited,
