@@ -138,7 +138,8 @@ VEC_INLINE void geocentric(double lat_deg, double h, double *from_axis, double *
     *from_equator = (n * (1 - e2) + h) * s;
 }
 
-/* Ranges go from the anchor straight through space. Longitudes are relative to the anchor's meridian. */
+/* Ranges go from the anchor straight through space. Longitudes are relative to the anchor's meridian. The anchor has
+ * its ellipsoidal height here. */
 VEC_CLONES static void set_geodetic_ranges(const struct block *restrict b, int n, const double anchor[3],
                                            const double scale[3], double *restrict range_m)
 {
@@ -158,6 +159,7 @@ static void columns_geo(const struct scanhead *sh, const struct block *b, int n,
 {
     const double *anchor = sh->anchor.anchor, *scale = sh->anchor.scale;
     const int geodetic = sh->anchor.crs == NATIVE_CRS_GEODETIC;
+    const double h_m = sh->anchor.heights == NATIVE_HEIGHTS_GEOID ? sh->anchor.height_m : anchor[2];
     if (to->x != NULL) set_places(b->a, b->tail, n, anchor[0], scale[0], to->x);
     if (to->y != NULL) set_places(b->b, b->tail, n, anchor[1], scale[1], to->y);
     if (to->z != NULL) set_places(b->c, b->tail, n, anchor[2], scale[2], to->z);
@@ -165,7 +167,7 @@ static void columns_geo(const struct scanhead *sh, const struct block *b, int n,
     if (to->range_m != NULL && sh->anchor.moving & NATIVE_MOVING)
         set_all(to->range_m, n, NAN);
     else if (to->range_m != NULL && geodetic)
-        set_geodetic_ranges(b, n, anchor, scale, to->range_m);
+        set_geodetic_ranges(b, n, (const double[]){anchor[0], anchor[1], h_m}, scale, to->range_m);
     else if (to->range_m != NULL)
         set_distances(b, n, scale, to->range_m);
     if (to->mirror_rad != NULL) set_all(to->mirror_rad, n, NAN);

@@ -147,6 +147,7 @@ static int copy_reply(struct scanhead *sh, char *reply, size_t reply_len)
     if (len >= reply_len)
         return sh_fail(&sh->err, SCANHEAD_EINPUT, "a reply of %zu characters does not fit into %zu", len, reply_len);
     memcpy(reply, sh->parser.text, len + 1);
+    sh->err.text[0] = '\0'; /* it may be of a wait on the way */
     return SCANHEAD_OK;
 }
 
@@ -239,7 +240,7 @@ int scanhead_command(struct scanhead *sh, const char *command, char *reply, size
         if (sh->ended) return host_over(sh);
         rc = deadline_ns < host_deadline_ns(0) ? SH_ETIMEOUT : host_fill(sh, deadline_ns);
     }
-    if (is_sent) give_up(sh, command);                  /* also where a frame that came meanwhile was wrong */
+    if (is_sent) give_up(sh, command);                  /* also after another error than a time-out */
     if (rc != SH_ETIMEOUT || timeout_ms < 0) return rc; /* no time limit: a signal ended the wait */
     return sh_fail(&sh->err, SCANHEAD_ETIMEOUT, "%s: no reply to '%s' within %d ms", sh->source.name, command,
                    timeout_ms);

@@ -135,16 +135,35 @@ const char *scanhead_error(const struct scanhead *sh)
     return sh->err.text;
 }
 
+/* Takes a frame into the state. Returns 0, or 1 for a frame that is to be left out. A stream that begins with another
+ * version is not ours, so this is an error. */
+static int take(struct scanhead *sh, const struct native_header *header, const uint8_t *raw, uint64_t at_byte)
+{
+    const int rc = host_absorb(sh, header, raw + NATIVE_HEADER_LEN);
+    if (rc != SH_EFORMAT) {
+        sh->has_taken = 1;
+        return rc;
+    }
+    host_note_refused(sh, header, at_byte);
+    return header->version != NATIVE_VERSION && !sh->has_taken ? rc : 1;
+}
+
 /* Drops the oldest frame. The frame's facts about the stream are taken in first, and the frame stays in the hash. */
 static int drop_oldest(struct scanhead *sh)
 {
     struct host_node *node = pop(sh);
     struct native_header header;
     native_read_header(node->raw, &header);
-    int rc = host_absorb(sh, &header, node->raw + NATIVE_HEADER_LEN);
-    sh->dropped++;
+    const int rc = take(sh, &header, node->raw, node->at_byte);
+    sh->dropped += (uint64_t)(rc == 0);
     free(node);
-    return rc;
+    return rc < 0 ? rc : 0;
+}
+
+/* Where the parser's present frame begins, in all bytes. */
+static uint64_t at_byte_of_frame(const struct native_parser *p)
+{
+    return p->stats.bytes - (p->end - p->start) - native_frame_len(p->frame);
 }
 
 int host_keep(struct scanhead *sh)
@@ -154,6 +173,7 @@ int host_keep(struct scanhead *sh)
     if (node == NULL) return sh_fail(&sh->err, SH_ENOMEM, "no memory to keep a frame of %zu bytes", len);
     node->next = NULL;
     node->len = len;
+    node->at_byte = at_byte_of_frame(&sh->parser);
     memcpy(node->raw, sh->parser.frame, len);
     if (sh->kept.last != NULL)
         sh->kept.last->next = node;
@@ -219,11 +239,12 @@ static void fill_event(struct scanhead_frame *frame)
     memcpy(frame->event_text, event.text, sizeof frame->event_text);
 }
 
-static int hand_out(struct scanhead *sh, const uint8_t *raw, struct scanhead_frame *frame)
+/* Returns as `take` does. */
+static int hand_out(struct scanhead *sh, const uint8_t *raw, uint64_t at_byte, struct scanhead_frame *frame)
 {
     struct native_header header;
     native_read_header(raw, &header);
-    int rc = host_absorb(sh, &header, raw + NATIVE_HEADER_LEN);
+    const int rc = take(sh, &header, raw, at_byte);
     if (rc != 0) return rc;
     *frame = (struct scanhead_frame){
         .type = header.type,
@@ -240,6 +261,7 @@ static int hand_out(struct scanhead *sh, const uint8_t *raw, struct scanhead_fra
     if (header.type == NATIVE_WAVES) fill_waves(frame);
     if (header.type == NATIVE_EVENT) fill_event(frame);
     sh->payload = frame->payload;
+    sh->err.text[0] = '\0'; /* it may be of a frame that was left out */
     return SCANHEAD_OK;
 }
 
@@ -281,29 +303,41 @@ static int closed(struct scanhead *sh)
     return host_gone(sh);
 }
 
+/* Hands out the first kept frame that is not to be left out. Returns 1 where there is none. */
+static int hand_out_kept(struct scanhead *sh, struct scanhead_frame *frame)
+{
+    int rc = 1;
+    do {
+        free(sh->kept.current);
+        sh->kept.current = sh->kept.first != NULL ? pop(sh) : NULL;
+        if (sh->kept.current != NULL) rc = hand_out(sh, sh->kept.current->raw, sh->kept.current->at_byte, frame);
+    } while (rc == 1 && sh->kept.current != NULL);
+    return rc;
+}
+
 int scanhead_next(struct scanhead *sh, struct scanhead_frame *frame, int timeout_ms)
 {
     memset(frame, 0, sizeof *frame);
     sh->payload = NULL;
     sh->has_no_limit = timeout_ms < 0;
-    free(sh->kept.current);
-    sh->kept.current = NULL;
-    if (sh->kept.first != NULL) {
-        sh->kept.current = pop(sh);
-        return hand_out(sh, sh->kept.current->raw, frame);
-    }
+    int rc = hand_out_kept(sh, frame);
+    if (rc <= 0) return rc;
     int64_t deadline_ns = 0; /* asked for only when there is something to wait for */
     for (;;) {
         enum native_item item;
         while ((item = native_parser_next(&sh->parser)) == NATIVE_TEXT)
             host_stray_line(sh);
-        if (item == NATIVE_FRAME) return hand_out(sh, sh->parser.frame, frame);
+        if (item == NATIVE_FRAME) {
+            rc = hand_out(sh, sh->parser.frame, at_byte_of_frame(&sh->parser), frame);
+            if (rc <= 0) return rc;
+            continue;
+        }
         if (sh->ended) return closed(sh);
         if (deadline_ns == 0)
             deadline_ns = host_deadline_ns(timeout_ms);
         else if (deadline_ns < host_deadline_ns(0) && timeout_ms != 0)
             return sh_fail(&sh->err, SCANHEAD_ETIMEOUT, "%s: no frame came within the time limit", sh->source.name);
-        int rc = host_fill(sh, deadline_ns);
+        rc = host_fill(sh, deadline_ns);
         if (rc != 0) return rc;
     }
 }

@@ -15,6 +15,7 @@ enum { HOST_QUEUE_BYTES = 64 << 20, HOST_TURN_PARTS = 256, HOST_BLOCK = 128 };
 struct host_node {
     struct host_node *next;
     size_t len;
+    uint64_t at_byte; /* where it begins in all bytes that were received */
     uint8_t raw[];
 };
 
@@ -37,16 +38,17 @@ struct host_times {
     int have_scan_t0, have_gps;
     int64_t scan_t0_ns;        /* device time of the scan's start */
     int64_t gps_at_ns, gps_ns; /* a device time, and the GPS time that the head's clock had then */
+    uint32_t gps_seq;          /* the event that says so */
 };
 
-/* Notices that the parser does not give: about lines that nobody waits for, and about connections. */
+/* Notices that the parser does not give: about lines that nobody waits for, frames with wrong contents, connections. */
 struct host_notices {
     void (*fn)(void *ctx, const struct scanhead_notice *notice); /* NULL: nobody listens */
     void *ctx;
     uint64_t given_up;   /* commands whose reply has not come, so far */
     uint64_t identities; /* of these, how many asked who the head is */
     int close_told;      /* CLOSED was given for this connection */
-    uint64_t echoes, late_replies, unasked, closed, reattached;
+    uint64_t echoes, late_replies, unasked, closed, reattached, refused;
 };
 
 struct scanhead {
@@ -55,6 +57,7 @@ struct scanhead {
     int lost;         /* ended, because the device was unplugged */
     int reset;        /* ended, because the bus was reset, with the device still on it */
     int stuck;        /* half a command went out: nothing sensible can follow */
+    int has_taken;    /* a frame of this version has come */
     int has_no_limit; /* the present call waits without a time limit, so a signal ends it */
     struct native_parser parser;
     struct host_notices notices;
@@ -67,9 +70,9 @@ struct scanhead {
 
     /* state that the stream has reported, up to the frame that was handed out last */
     int have_seq, have_descriptor, have_anchor, have_pulse;
-    uint32_t last_seq;      /* of a frame that is not LOCAL */
-    uint64_t last_repeated; /* how many frames were repeated up to it */
-    int told_alone;         /* a descriptor for this reader alone came after last_seq */
+    uint32_t last_seq;                   /* of a frame that is not LOCAL */
+    int told_alone;                      /* a descriptor for this reader alone came after last_seq */
+    uint32_t descriptor_seq, anchor_seq; /* frames that gave the descriptor and the anchor at hand */
     struct native_descriptor descriptor;
     struct native_emitter emitter; /* kind NATIVE_EMIT_LINE: none came after the descriptor */
     struct native_beam beam[NATIVE_MAX_BEAMS];
@@ -97,9 +100,11 @@ void host_note_line(struct scanhead *sh, int is_echo);
  * given all items by then. */
 void host_note_closed(struct scanhead *sh);
 void host_note_reattached(struct scanhead *sh);
+/* Gives the notice that the frame is not handed out, for the reason in sh->err. */
+void host_note_refused(struct scanhead *sh, const struct native_header *header, uint64_t at_byte);
 
 /* Takes a frame into the state: descriptor, anchor, names, counters, hash. To be called once per frame, in stream
- * order. */
+ * order. SH_EFORMAT: the frame has wrong contents or another version. */
 int host_absorb(struct scanhead *sh, const struct native_header *header, const uint8_t *payload);
 
 /* Takes the number of frames that the session has left out so far. A session begins anew with 0. */

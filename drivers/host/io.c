@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Waiting and reading, with deadlines on the monotonic clock; and the sources that are descriptors. */
 #include <errno.h>
+#include <fcntl.h>
 #include <poll.h>
 #include <string.h>
 #include <sys/socket.h>
@@ -40,8 +41,11 @@ int host_fd_wait(struct host_source *source, short events, int64_t deadline_ns, 
     return n;
 }
 
+/* Other descriptors may share the open file description of "fd:N", so it gets back its flag. */
 static void fd_close(struct host_source *source)
 {
+    const int flags = source->was_blocking ? fcntl(source->fd, F_GETFL) : -1;
+    if (flags >= 0) fcntl(source->fd, F_SETFL, flags & ~O_NONBLOCK);
     close(source->fd);
 }
 

@@ -54,6 +54,18 @@ void host_note_line(struct scanhead *sh, int is_echo)
     give(sh, &notice);
 }
 
+void host_note_refused(struct scanhead *sh, const struct native_header *header, uint64_t at_byte)
+{
+    const struct scanhead_notice notice = {.kind = SCANHEAD_NOTICE_REFUSED,
+                                           .seq = header->seq,
+                                           .at_byte = at_byte,
+                                           .n = 1,
+                                           .t_ns = header->t_ns,
+                                           .why = sh->err.text};
+    sh->notices.refused++;
+    give(sh, &notice);
+}
+
 static void note_connection(struct scanhead *sh, enum scanhead_notice_kind kind, uint64_t n)
 {
     const struct scanhead_notice notice = {
@@ -93,6 +105,7 @@ const char *scanhead_notice_name(int kind)
         [SCANHEAD_NOTICE_UNASKED] = "unasked",
         [SCANHEAD_NOTICE_CLOSED] = "closed",
         [SCANHEAD_NOTICE_REATTACHED] = "reattached",
+        [SCANHEAD_NOTICE_REFUSED] = "refused",
     };
     return kind > 0 && kind < (int)(sizeof name / sizeof name[0]) ? name[kind] : "?";
 }

@@ -62,7 +62,7 @@ struct scanhead;
  *   "usb", "usb:vid:pid", "usb:vid:pid:serial"   the head's own USB interface; ids in hexadecimal
  *   "tty:/dev/ttyACM0"                           a serial port or pty
  *   "tcp:host:port"
- *   "fd:N"                                       an open descriptor; the handle closes it
+ *   "fd:N"                                       an open descriptor; the handle closes it, and keeps it from blocking
  *   PATH                                         a raw stream (.shs), or its frames as packets (.pcapng)
  * On failure *out is NULL, and err (may be NULL) gets the reason. */
 int scanhead_open(const char *source, struct scanhead **out, char *err, size_t err_len);
@@ -71,9 +71,8 @@ int scanhead_open(const char *source, struct scanhead **out, char *err, size_t e
  * wrong source ends the tries at once, except a "tty:", which may still appear. A signal ends the tries early. One try
  * to connect by TCP may take 10 s, also beyond timeout_ms or after a signal. err gets the reason of the last try. */
 int scanhead_open_within(const char *source, int timeout_ms, struct scanhead **out, char *err, size_t err_len);
-/* sh may be NULL. */
-void scanhead_close(struct scanhead *sh);
-/* Returns the text of the last error. The text is the handle's, until the handle's next call. */
+void scanhead_close(struct scanhead *sh); /* sh may be NULL */
+/* Returns the text of the last error, empty after a command or a frame. It is the handle's, until the next call. */
 const char *scanhead_error(const struct scanhead *sh);
 
 /* Waits until the same head is there again, and goes on with it. To be called after SCANHEAD_ELOST,
@@ -151,21 +150,19 @@ struct scanhead_frame {
     uint32_t scan_frame, scan_line, n_points, n_pulses;
     uint64_t pulse0;
     int64_t scan_t0_ns, line_t0_ns; /* since the scan's start: of pulse0, of the line's first pulse */
-    /* for SCANHEAD_EVENT */
-    uint32_t event; /* enum scanhead_event_code */
+    uint32_t event;                 /* of SCANHEAD_EVENT, as the next two: enum scanhead_event_code */
     uint64_t event_value[3];
-    char event_text[96];
+    char event_text[96]; /* as on the wire: also control characters */
 };
 
-/* Gets the next frame, in order. Frames with a wrong CRC, repeated frames, and frames that come after newer ones are
- * left out and counted, see scanhead_on_notice. */
+/* Gets the next frame, in order. Damaged, wrong, repeated and late frames are left out, see scanhead_on_notice.
+ * SCANHEAD_EFORMAT: the stream has no frame, or begins with one of another version; then the next call goes on. */
 int scanhead_next(struct scanhead *sh, struct scanhead_frame *frame, int timeout_ms);
 
 /* Notices about a stream, one for each event. Losses are counted in two independent ways:
  *   By frame number: GAP, REPEATED, LATE, RESTARTED. Each frame that did not come in order is in one GAP, even if it
  *   comes later. Only a restart hides missing frames. The n of all GAPs add up to stats.seq_lost.
- *   By byte: BAD_PAYLOAD, BAD_BYTES, CUT. Each byte that belongs to no frame and no reply is in one of these notices,
- *   whose n add up to stats.bad_bytes.
+ *   By byte: BAD_PAYLOAD, BAD_BYTES, CUT. Each byte of no frame and no reply is in one; their n add up to bad_bytes.
  * A damaged frame is counted both ways: first its bytes, then its number, once the next frame shows the gap. */
 enum scanhead_notice_kind {
     /* n frames are missing, from seq on. at_byte: of the frame that came instead. Where the head reports that the
@@ -201,6 +198,8 @@ enum scanhead_notice_kind {
     SCANHEAD_NOTICE_CLOSED = 11,
     /* scanhead_reattach has found the head again. */
     SCANHEAD_NOTICE_REATTACHED = 12,
+    /* A whole frame, in order, has wrong contents or another version: `why` says more. It is not handed out. */
+    SCANHEAD_NOTICE_REFUSED = 13,
 };
 
 #define SCANHEAD_NO_TIME INT64_MIN
@@ -210,14 +209,14 @@ struct scanhead_notice {
     uint32_t seq;     /* of the frame that the kind names; else 0 */
     uint64_t at_byte; /* where it begins, in all bytes that this handle has received, over all its connections */
     uint64_t n;       /* as the kind says; 1 for one frame */
-    int64_t t_ns; /* device time of the frame concerned. For bytes, lines and connections: that of the last whole frame
-                   * before, or SCANHEAD_NO_TIME */
+    int64_t t_ns;     /* device time of the frame concerned, else of the last whole frame before, or SCANHEAD_NO_TIME */
+    const char *why;  /* REFUSED: a line of text, valid until fn returns; else NULL */
 };
 
 /* fn gets each notice, from within scanhead_next, scanhead_command and scanhead_reattach, and in the order of the
  * stream: at_byte never falls. A notice comes before the frame that follows it in the stream. While a command waits for
- * its reply, frames that came earlier may still be kept for scanhead_next. On this handle fn may only call
- * scanhead_get_stats, which already counts the notice. NULL, as at first: no function. Counters go on either way. */
+ * its reply, frames that came earlier may still be kept for scanhead_next; REFUSED waits with them. On this handle fn
+ * may only call scanhead_get_stats, which already counts the notice. NULL, as at first: no function. Counters go on. */
 void scanhead_on_notice(struct scanhead *sh, void (*fn)(void *ctx, const struct scanhead_notice *notice), void *ctx);
 /* Returns the kind in lower case, such as "bad payload"; "?" for another number. */
 const char *scanhead_notice_name(int kind);
@@ -436,6 +435,7 @@ struct scanhead_stats { /* over all connections of the handle */
     /* Frames of bad_payload that no gap shows: before the first whole frame, before a restart, and after the last whole
      * frame. So seq_lost + bad_unseen frames are known to be lost on the way. */
     uint64_t bad_unseen;
+    uint64_t refused; /* frames with wrong contents or of another version; frames above counts them, too */
 };
 void scanhead_get_stats(const struct scanhead *sh, struct scanhead_stats *stats);
 

@@ -173,6 +173,7 @@ static int open_fd(const char *number, struct host_source *out, struct sh_err *e
     if (flags < 0 || fcntl((int)n, F_SETFL, flags | O_NONBLOCK) != 0)
         return sh_fail(err, SH_EIO, "%s: %s", out->name, strerror(errno));
     out->fd = (int)n;
+    out->was_blocking = (flags & O_NONBLOCK) == 0;
     out->is_socket = S_ISSOCK(st.st_mode);
     out->is_file = S_ISREG(st.st_mode);
     return 0;

@@ -37,9 +37,10 @@ struct host_source {
     struct host_capture *capture; /* of a .pcapng; else NULL */
     void *ctx;                    /* of host_open()'s caller */
     int is_file, is_socket;
-    int unsettled;   /* lines may come that answer no command of ours: on a new terminal, after a time-out */
-    int asked;       /* *IDN? without an answer yet: sent to skip such lines, or by a command that was given up */
-    char name[4112]; /* for messages, and to open it again: a path (PATH_MAX) after "tty:" */
+    int was_blocking; /* "fd:N": the caller's open file description was, and is again after close */
+    int unsettled;    /* lines may come that answer no command of ours: on a new terminal, after a time-out */
+    int asked;        /* *IDN? without an answer yet: sent to skip such lines, or by a command that was given up */
+    char name[4112];  /* for messages, and to open it again: a path (PATH_MAX) after "tty:" */
 };
 
 /* host.c: a handle with a source that the caller has opened. NULL: no memory, and the source is still the caller's. */

@@ -31,6 +31,7 @@ static int absorb_descriptor(struct scanhead *sh, const struct native_header *he
         sh->have_anchor = sh->have_pulse = 0;
         host_forget_poses(sh);
         sh->emitter = (struct native_emitter){.kind = NATIVE_EMIT_LINE};
+        sh->descriptor_seq = header->seq;
     }
     sh->descriptor = d;
     sh->have_descriptor = 1;
@@ -53,6 +54,7 @@ static int absorb_anchor(struct scanhead *sh, const struct native_header *header
     struct native_anchor a;
     if (native_decode_anchor(payload, header->length, &a) != 0) return bad(sh, "a wrong anchor");
     sh->anchor = a;
+    if (!sh->have_anchor || (header->flags & NATIVE_REPEAT) == 0) sh->anchor_seq = header->seq;
     /* Without the descriptor of its scan, an anchor may be one of the scan before. */
     sh->have_anchor = sh->have_descriptor;
     return 0;
@@ -65,25 +67,32 @@ static void forget(struct scanhead *sh)
     host_forget_poses(sh);
 }
 
+/* Whether a recording holds a second copy of frame `seq` right before the present one. Recordings that were put one
+ * after the other may begin with the same frames. The parser drops the second copies as repeated, up to the first frame
+ * that differs. The state that comes from such a frame is that of the new sequence, too. */
+static int came_again(const struct scanhead *sh, const struct native_header *header, uint32_t seq)
+{
+    return sh->source.is_file && header->seq - 1 - seq < sh->parser.sequence.again;
+}
+
 /* Forgets the state where another sequence of numbers begins: the head has started again, or recordings were put one
- * after the other. The parser drops repeated and late frames. So a number that goes back means another sequence. The
- * state is kept in two cases. First, the new sequence may have begun with frames equal to earlier ones. The parser
- * dropped them as repeated, and the state already has what they say. Second, a descriptor for this reader alone (LOCAL)
- * may have come just before. The state since then is that of the new sequence. */
+ * after the other. The parser drops repeated and late frames. So a number that goes back, or does not go on, means
+ * another sequence. Where a descriptor for this reader alone (LOCAL) came just before, the state since then is that of
+ * the new sequence. */
 static void follow_sequence(struct scanhead *sh, const struct native_header *header)
 {
-    const uint64_t repeated = sh->parser.stats.repeated;
     if ((header->flags & NATIVE_LOCAL) != 0) return;
-    if (sh->have_seq && header->seq - sh->last_seq > INT32_MAX) {
-        sh->have_pulse = 0;
-        if (repeated == sh->last_repeated && !sh->told_alone) {
-            forget(sh);
-            sh->times = (struct host_times){0};
-        }
+    const int is_back = sh->have_seq && header->seq - sh->last_seq - 1 > INT32_MAX;
+    if (is_back) sh->have_pulse = 0;
+    if (is_back && !sh->told_alone) {
+        sh->have_descriptor &= came_again(sh, header, sh->descriptor_seq);
+        sh->have_anchor &= sh->have_descriptor && came_again(sh, header, sh->anchor_seq);
+        if (!came_again(sh, header, sh->times.gps_seq)) sh->times.have_gps = 0;
+        sh->times.have_scan_t0 = 0;
+        host_forget_poses(sh);
     }
     sh->have_seq = 1;
     sh->last_seq = header->seq;
-    sh->last_repeated = repeated;
     sh->told_alone = 0;
 }
 
@@ -128,23 +137,24 @@ static int absorb_poses(struct scanhead *sh, const struct native_header *header,
 }
 
 /* Notes the head's clock at a device time. GPS time fits: it is below 2^63 ns until 2272. */
-static void set_gps(struct scanhead *sh, uint64_t at_ns, uint64_t gps_ns)
+static void set_gps(struct scanhead *sh, uint32_t seq, uint64_t at_ns, uint64_t gps_ns)
 {
+    sh->times.gps_seq = seq;
     sh->times.gps_at_ns = (int64_t)at_ns;
     sh->times.gps_ns = (int64_t)gps_ns;
     sh->times.have_gps = 1;
 }
 
-static void absorb_time(struct scanhead *sh, const struct native_event *event)
+static void absorb_time(struct scanhead *sh, uint32_t seq, const struct native_event *event)
 {
     if (event->code == NATIVE_EV_SCAN_START) {
         sh->times.scan_t0_ns = (int64_t)event->b;
         sh->times.have_scan_t0 = 1;
-        set_gps(sh, event->b, event->c);
+        set_gps(sh, seq, event->b, event->c);
         sh->times.have_gps = event->c != 0;
     }
-    if (event->code == NATIVE_EV_TIME) set_gps(sh, event->b, event->c);
-    if (event->code == NATIVE_EV_PPS) set_gps(sh, event->b, event->c * 1000000000u);
+    if (event->code == NATIVE_EV_TIME) set_gps(sh, seq, event->b, event->c);
+    if (event->code == NATIVE_EV_PPS) set_gps(sh, seq, event->b, event->c * 1000000000u);
 }
 
 /* A SCAN_START with the descriptor's number is of another scan if that scan has another start: the head has started
@@ -169,7 +179,7 @@ static int absorb_event(struct scanhead *sh, const struct native_header *header,
     if (event.code == NATIVE_EV_OVERRUN) sh->pulses_lost_told += event.b;
     if (event.code == NATIVE_EV_SCAN_END) sh->pulses_lost_ended += event.c;
     if (event.code == NATIVE_EV_SCAN_START && is_other_scan(sh, &event)) forget(sh);
-    absorb_time(sh, &event);
+    absorb_time(sh, header->seq, &event);
     return 0;
 }
 
@@ -234,10 +244,10 @@ static int (*const absorbers[])(struct scanhead *sh, const struct native_header 
 int host_absorb(struct scanhead *sh, const struct native_header *header, const uint8_t *payload)
 {
     absorb_hash(sh, header, payload);
+    follow_sequence(sh, header);
     if (header->version != NATIVE_VERSION)
         return sh_fail(&sh->err, SH_EFORMAT, "%s: the head speaks version %u of the protocol; this library reads %d",
                        sh->source.name, header->version, NATIVE_VERSION);
-    follow_sequence(sh, header);
     /* line end and telemetry change nothing; unknown types are for later readers */
     if (header->type >= sizeof absorbers / sizeof absorbers[0] || absorbers[header->type] == NULL) return 0;
     return absorbers[header->type](sh, header, payload);
@@ -383,6 +393,7 @@ void scanhead_get_stats(const struct scanhead *sh, struct scanhead_stats *stats)
         .unasked = sh->notices.unasked,
         .closed = sh->notices.closed,
         .reattached = sh->notices.reattached,
+        .refused = sh->notices.refused,
     };
 }
 

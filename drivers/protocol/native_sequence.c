@@ -80,6 +80,15 @@ static enum native_notice_kind look_at_local(struct native_sequence *s, const st
     return NATIVE_NO_NOTICE;
 }
 
+/* Counts repeated frames whose numbers lead up to the next frame. */
+static void count_again(struct native_sequence *s, uint32_t seq, int is_again)
+{
+    if (seq != s->again_next) s->again = 0;
+    if (!is_again) return;
+    s->again++;
+    s->again_next = seq + 1;
+}
+
 enum native_notice_kind native_sequence_take(struct native_sequence *s, const struct native_header *frame,
                                              uint32_t *first, uint32_t *n)
 {
@@ -91,6 +100,7 @@ enum native_notice_kind native_sequence_take(struct native_sequence *s, const st
     const int fresh = s->fresh;
     s->fresh = 0;
     if (s->have && frame->seq != s->next) kind = look_at_jump(s, frame, fresh, first, n);
+    count_again(s, frame->seq, kind == NATIVE_REPEATED);
     if (kind == NATIVE_REPEATED) return kind;
     s->seen[s->n_seen++ % NATIVE_SEEN] = *frame;
     if (kind == NATIVE_LATE) return kind;

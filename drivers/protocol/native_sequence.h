@@ -44,7 +44,8 @@ struct native_sequence {
     int fresh; /* 1: another connection has begun, and no counted frame has come on it yet */
     uint32_t next;
     uint32_t last_late, late_run; /* the last late frame, and how many came in a row up to it */
-    uint32_t n_seen, n_gaps;      /* since the start; the last NATIVE_SEEN and NATIVE_GAPS of them are kept */
+    uint32_t again, again_next; /* how many repeated frames came last, with consecutive numbers up to again_next - 1 */
+    uint32_t n_seen, n_gaps;    /* since the start; the last NATIVE_SEEN and NATIVE_GAPS of them are kept */
     struct native_header seen[NATIVE_SEEN];
     struct {
         uint32_t first, n;

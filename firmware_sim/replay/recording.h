@@ -2,8 +2,8 @@
 /* A recording, frame by frame, with the time at which the head released each.
  *
  * In: a file of the native protocol's frames (.shs, .pcapng), read by the client library. Out: its frames as they are,
- * in their order. Frames that came twice or too late, and bytes that are in no frame, are left out and counted. Only
- * the frames that wait for their time (timing.h) are in memory. One thread. */
+ * in their order. Frames that came twice or too late, frames with wrong contents, and bytes that are in no frame, are
+ * left out and counted. Only the frames that wait for their time (timing.h) are in memory. One thread. */
 #ifndef FIRMWARE_SIM_REPLAY_RECORDING_H
 #define FIRMWARE_SIM_REPLAY_RECORDING_H
 

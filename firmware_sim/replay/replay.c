@@ -257,6 +257,7 @@ void replay_get_summary(struct replay *r, struct replay_summary *summary)
                                        .bad_bytes = stats.bad_bytes,
                                        .repeated = stats.repeated,
                                        .late = stats.late,
+                                       .refused = stats.refused,
                                        .cut = stats.cuts != 0};
     snprintf(summary->idn, sizeof summary->idn, "%s", r->idn);
     pthread_mutex_unlock(&r->lock);

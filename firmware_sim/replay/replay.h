@@ -51,6 +51,7 @@ struct replay_summary {
     uint64_t frames;         /* frames sent, over all times */
     uint64_t bad_bytes;      /* bytes of the file that are in no frame, in the last time */
     uint64_t repeated, late; /* frames of the file that were left out, since they came twice or too late */
+    uint64_t refused;        /* frames left out for wrong contents or another version */
     int cut;                 /* the file ends within a frame */
 };
 void replay_get_summary(struct replay *replay, struct replay_summary *summary);

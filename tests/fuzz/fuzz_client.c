@@ -17,9 +17,11 @@ enum { MAX_RECORDS = 64, MAX_BYTES = 2048 };
 static void note(void *ctx, const struct scanhead_notice *notice)
 {
     uint64_t *last = ctx;
-    fuzz_must(notice->at_byte >= *last, "notices come in the order of the stream");
+    const int is_refused = notice->kind == SCANHEAD_NOTICE_REFUSED; /* it may wait for its turn */
+    fuzz_must(is_refused || notice->at_byte >= *last, "notices come in the order of the stream");
+    fuzz_must((notice->why != NULL) == is_refused, "a refusal has a reason");
     fuzz_must(scanhead_notice_name((int)notice->kind)[0] != '?', "each kind has a name");
-    *last = notice->at_byte;
+    if (!is_refused) *last = notice->at_byte;
 }
 
 static void ask(struct scanhead *sh, unsigned how)

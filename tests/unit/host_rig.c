@@ -82,6 +82,11 @@ uint32_t rig_next_seq(void)
     return rig_seq++;
 }
 
+void rig_begin_sequence(void)
+{
+    rig_seq = 0;
+}
+
 /* Sends the frame in `out`, with the next number. */
 static void put_frame(int fd, size_t len)
 {
@@ -122,6 +127,22 @@ static struct scanhead *open_fd(int fd)
     return sh;
 }
 
+int rig_write_recording(void)
+{
+    char path[] = "/tmp/scanhead-rig-XXXXXX";
+    const int fd = mkstemp(path);
+    assert_true(fd >= 0);
+    assert_int_equal(unlink(path), 0);
+    rig_begin_sequence();
+    return fd;
+}
+
+struct scanhead *rig_read_recording(int fd)
+{
+    assert_int_equal(lseek(fd, 0, SEEK_SET), 0);
+    return open_fd(fd);
+}
+
 struct scanhead *open_pair(int *head)
 {
     int fd[2];
@@ -129,6 +150,28 @@ struct scanhead *open_pair(int *head)
     assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM, 0, fd), 0);
     *head = fd[0];
     return open_fd(fd[1]);
+}
+
+static char refusal[256];
+
+static void note_refusal(void *ctx, const struct scanhead_notice *notice)
+{
+    (void)ctx;
+    if (notice->kind == SCANHEAD_NOTICE_REFUSED) snprintf(refusal, sizeof refusal, "%s", notice->why);
+}
+
+const char *expect_refused_frame(struct scanhead *sh)
+{
+    struct scanhead_frame f;
+    struct scanhead_stats before, after;
+    scanhead_get_stats(sh, &before);
+    scanhead_on_notice(sh, note_refusal, NULL);
+    const int rc = scanhead_next(sh, &f, 0);
+    scanhead_on_notice(sh, NULL, NULL);
+    scanhead_get_stats(sh, &after);
+    assert_true(rc == SCANHEAD_ETIMEOUT || rc == SCANHEAD_ECLOSED);
+    assert_int_equal(after.refused - before.refused, 1);
+    return refusal;
 }
 
 void expect_frame(struct scanhead *sh, int type, struct scanhead_frame *frame)

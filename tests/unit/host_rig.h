@@ -45,8 +45,18 @@ void put_points(int fd, uint32_t n, uint64_t pulse0);
 
 void put_event(int fd, uint32_t code, uint64_t va, uint64_t vb, uint64_t vc, int flags);
 
+/* The next frame begins another sequence: it has number 0. */
+void rig_begin_sequence(void);
+
+/* Opens an empty recording for frames from number 0 on; then a handle that reads it from its begin. */
+int rig_write_recording(void);
+struct scanhead *rig_read_recording(int fd);
+
 /* Opens a handle, and writes the head's end of its socket pair. */
 struct scanhead *open_pair(int *head);
+
+/* The frames that have come give one refusal, and nothing is handed out. Returns its reason. */
+const char *expect_refused_frame(struct scanhead *sh);
 
 void expect_frame(struct scanhead *sh, int type, struct scanhead_frame *frame);
 

@@ -46,6 +46,20 @@ test('geodetic points have a range from a station; from a head that moves they h
   equal(rangeOf(1), NaN, 'range of a head that moves');
 });
 
+test('a geodetic range, with heights above the geoid: along the meridian, the radius of curvature and the true height', () => {
+  const view = new DataView(new ArrayBuffer(40 + 20));
+  view.setInt32(40, 18000000, true); // 0.018 degrees to the north
+  view.setUint32(40 + 16, 0x11000000, true);
+  for (const heights of [0, 1]) {
+    const c = new Columns(1), height_m = heights ? 147 : 100; // 47 m are 15 mm of the range
+    geoPlacer({range_max_m: 4000}, {crs: 3, heights, moving: 0, anchor: [45, 13.1, 100], scale: [1e-9, 1e-9, 1e-4],
+      lat_deg: 45, lon_deg: 13.1, height_m, station_m: [0, 0, 0], axes: [1, 0, 0, 0, 1, 0, 0, 0, 1]})(c, view, 1, 0, 0);
+    const e2 = (2 - 1 / 298.257223563) / 298.257223563, s = Math.sin(45.009 * Math.PI / 180);
+    const radius_m = 6378137 * (1 - e2) / (1 - e2 * s * s) ** 1.5 + height_m;
+    near(c.range[0], 0.018 * Math.PI / 180 * radius_m, 1e-3, 'range'); // a float near 2 km has steps of 1e-4 m
+  }
+});
+
 test('poses: from the first to the last of a frame, both included', () => {
   const poses = new Poses(), quat = [1, 0, 0, 0];
   poses.add([{t_ns: 0n, position_m: [0, 0, 0], quat}, {t_ns: 1000n, position_m: [2, 0, 0], quat}]);

@@ -34,9 +34,23 @@ static int now(void)
     return (int)(clock_rig_ns / MS) - BEGAN_MS;
 }
 
+static void (*note)(void *ctx, const struct scanhead_notice *notice);
+static void *note_ctx;
+
+void scanhead_on_notice(struct scanhead *sh, void (*fn)(void *ctx, const struct scanhead_notice *notice), void *ctx)
+{
+    note = sh == handle ? fn : NULL;
+    note_ctx = ctx;
+}
+
 int scanhead_next(struct scanhead *sh, struct scanhead_frame *frame, int timeout_ms)
 {
     if (sh != handle || (timeout_ms != 250 && timeout_ms != 20)) return SCANHEAD_EINPUT;
+    for (; turns->rc == 2; turns++) {
+        const struct scanhead_notice it = {
+            .kind = SCANHEAD_NOTICE_REFUSED, .seq = turns->frame.seq, .at_byte = 1234, .n = 1, .why = "it is wrong"};
+        note(note_ctx, &it);
+    }
     if (turns->rc == 1) {
         clock_rig_ns += 250 * MS;
         return SCANHEAD_ETIMEOUT;

@@ -7,7 +7,7 @@
 #include "firmware_sim/app/studio/record/recording.h"
 #include "tests/unit/trace_rig.h"
 
-/* The next wait for a frame takes ms, and gives rc and the frame. */
+/* The next wait for a frame takes ms, and gives rc and the frame. rc 2: the library refuses the frame, and waits on. */
 struct turn {
     int rc, ms;
     struct scanhead_frame frame;

@@ -59,13 +59,14 @@ static void test_notices_and_errors(void **state)
     static const int notices[] = {SCANHEAD_NOTICE_GAP,       SCANHEAD_NOTICE_REPEATED,    SCANHEAD_NOTICE_LATE,
                                   SCANHEAD_NOTICE_RESTARTED, SCANHEAD_NOTICE_BAD_PAYLOAD, SCANHEAD_NOTICE_BAD_BYTES,
                                   SCANHEAD_NOTICE_CUT,       SCANHEAD_NOTICE_ECHO,        SCANHEAD_NOTICE_LATE_REPLY,
-                                  SCANHEAD_NOTICE_UNASKED,   SCANHEAD_NOTICE_CLOSED,      SCANHEAD_NOTICE_REATTACHED};
+                                  SCANHEAD_NOTICE_UNASKED,   SCANHEAD_NOTICE_CLOSED,      SCANHEAD_NOTICE_REATTACHED,
+                                  SCANHEAD_NOTICE_REFUSED};
     for (int i = 0; i < (int)(sizeof notices / sizeof notices[0]); i++)
         assert_int_equal(notices[i], i + 1);
     assert_string_equal(scanhead_notice_name(SCANHEAD_NOTICE_GAP), "gap");
-    assert_string_equal(scanhead_notice_name(SCANHEAD_NOTICE_REATTACHED), "reattached");
+    assert_string_equal(scanhead_notice_name(SCANHEAD_NOTICE_REFUSED), "refused");
     assert_string_equal(scanhead_notice_name(0), "?");
-    assert_string_equal(scanhead_notice_name(SCANHEAD_NOTICE_REATTACHED + 1), "?");
+    assert_string_equal(scanhead_notice_name(SCANHEAD_NOTICE_REFUSED + 1), "?");
     static const int errors[][2] = {
         {SCANHEAD_OK, SH_OK},           {SCANHEAD_EINPUT, SH_EINPUT},   {SCANHEAD_EIO, SH_EIO},
         {SCANHEAD_ENOMEM, SH_ENOMEM},   {SCANHEAD_EPERM, SH_EPERM},     {SCANHEAD_ETIMEOUT, SH_ETIMEOUT},

@@ -243,14 +243,72 @@ static void test_late_list(void **state)
     scanhead_close(sh);
 }
 
+/* Writes an event that is whole, and whose text has no end, or whose version is of later times. */
+static size_t make_wrong_event(uint8_t *to, uint32_t seq, int has_version)
+{
+    const size_t n = make_event(to, seq);
+    if (has_version)
+        to[2] = NATIVE_VERSION + 1;
+    else
+        memset(to + NATIVE_HEADER_LEN + 32, 'x', 96);
+    native_reseal(to, n);
+    return n;
+}
+
+/* A whole frame that is wrong gives one notice, in its turn, and the next frame is handed out. The frame counts in the
+ * sequence: no number is missing. */
+static void test_refused(void **state)
+{
+    (void)state;
+    int head;
+    char reply[64];
+    struct scanhead *sh = open_pair(&head);
+    struct scanhead_frame f;
+    uint8_t raw[3 * EVENT + 4];
+    listen_to(sh);
+    put_numbered(head, 0);
+    for (uint32_t seq = 1; seq <= 2; seq++)
+        put_all(head, raw, make_wrong_event(raw, seq, seq == 1));
+    put_numbered(head, 3);
+    expect_frame(sh, SCANHEAD_EVENT, &f);
+    assert_int_equal(n_noticed, 0);
+    expect_frame(sh, SCANHEAD_EVENT, &f);
+    assert_int_equal(f.seq, 3);
+    assert_int_equal(n_noticed, 2);
+    expect_notice(0, SCANHEAD_NOTICE_REFUSED, EVENT, 1, 1);
+    expect_notice(1, SCANHEAD_NOTICE_REFUSED, 2 * EVENT, 2, 1);
+    assert_string_equal(scanhead_error(sh), ""); /* a reason is no error of the call */
+    assert_int_equal(noticed[1].t_ns, 12);
+    assert_true(noticed_stats.frames == 3 && noticed_stats.refused == 2 && noticed_stats.seq_lost == 0);
+    make_event(raw, 4); /* these come before a reply, and wait for their turn */
+    make_wrong_event(raw + EVENT, 5, 0);
+    make_event(raw + 2 * EVENT, 6);
+    memcpy(raw + 3 * EVENT, "7\r\n", 3);
+    struct play p = {.fd = head, .turn = {{"PRR?", raw, 3 * EVENT + 3}}};
+    assert_int_equal(command_played(sh, &p, "PRR?", reply, WAIT_MS), 0);
+    assert_string_equal(scanhead_error(sh), "");
+    assert_int_equal(n_noticed, 2);
+    for (uint32_t seq = 4; seq <= 6; seq += 2) {
+        expect_frame(sh, SCANHEAD_EVENT, &f);
+        assert_int_equal(f.seq, seq);
+        assert_int_equal(n_noticed, seq == 4 ? 2 : 3);
+    }
+    expect_notice(2, SCANHEAD_NOTICE_REFUSED, 5 * EVENT, 5, 1);
+    put_all(head, raw, make_wrong_event(raw, 7, 1)); /* it is the last: the connection ends as any other */
+    close(head);
+    assert_int_equal(scanhead_next(sh, &f, WAIT_MS), SCANHEAD_ECLOSED);
+    expect_notice(3, SCANHEAD_NOTICE_REFUSED, 7 * EVENT + 3, 7, 1);
+    scanhead_close(sh);
+}
+
 static void test_names(void **state)
 {
     (void)state;
     assert_string_equal(scanhead_notice_name(SCANHEAD_NOTICE_BAD_PAYLOAD), "bad payload");
     assert_string_equal(scanhead_notice_name(0), "?");
     assert_string_equal(scanhead_notice_name(-1), "?");
-    assert_string_equal(scanhead_notice_name(SCANHEAD_NOTICE_REATTACHED + 1), "?");
-    for (int kind = SCANHEAD_NOTICE_GAP; kind <= SCANHEAD_NOTICE_REATTACHED; kind++)
+    assert_string_equal(scanhead_notice_name(SCANHEAD_NOTICE_REFUSED + 1), "?");
+    for (int kind = SCANHEAD_NOTICE_GAP; kind <= SCANHEAD_NOTICE_REFUSED; kind++)
         assert_true(strlen(scanhead_notice_name(kind)) > 1);
 }
 
@@ -261,7 +319,7 @@ int main(void)
         cmocka_unit_test(test_echo),          cmocka_unit_test(test_late_reply),
         cmocka_unit_test(test_late_identity), cmocka_unit_test(test_before_a_command),
         cmocka_unit_test(test_late_list),     cmocka_unit_test(test_names),
-        cmocka_unit_test(test_never_sent),
+        cmocka_unit_test(test_never_sent),    cmocka_unit_test(test_refused),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

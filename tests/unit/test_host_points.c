@@ -120,21 +120,24 @@ static void test_geo_points(void **state)
 }
 
 /* In degrees longitudes stay within 180, and ranges are straight through space. On the meridian a degree is its radius
- * of curvature at the middle (WGS 84). The difference of the arc and the chord is 1e-8 of 2 km. */
+ * of curvature at the middle (WGS 84) and the ellipsoidal height, here 100 m or, by heights above the geoid, 147 m. These
+ * 47 m are 15 mm of the range. The difference of the arc and the chord is 1e-8 of 2 km. */
 static void test_geodetic_points(void **state)
 {
     (void)state;
     static const double lon_deg[] = {179.9999, -179.9999};
     static const int32_t count[4][3] = {{0, 30000, 0}, {0, -30000, 0}, {1800000, 0, 0}, {0, 0, 5000}};
-    for (int k = 0; k < 2; k++) {
+    for (int k = 0; k < 4; k++) {
         int head;
         struct scanhead *sh = open_pair(&head);
         struct scanhead_frame f;
         struct scanhead_point p[4];
         struct native_anchor anchor = make_anchor();
-        const double at[3] = {45, lon_deg[k], 100}, scale[3] = {1e-8, 1e-8, 1e-3};
+        const double at[3] = {45, lon_deg[k % 2], 100}, scale[3] = {1e-8, 1e-8, 1e-3};
         anchor.crs = NATIVE_CRS_GEODETIC;
         anchor.epsg = 4979;
+        anchor.heights = k < 2 ? NATIVE_HEIGHTS_ELLIPSOID : NATIVE_HEIGHTS_GEOID;
+        anchor.height_m = k < 2 ? 100 : 147;
         memcpy(anchor.anchor, at, sizeof at);
         memcpy(anchor.scale, scale, sizeof scale);
         for (int i = 0; i < 4; i++) {
@@ -151,11 +154,11 @@ static void test_geodetic_points(void **state)
         for (int i = 0; i < 3; i++)
             assert_int_equal(scanhead_next(sh, &f, WAIT_MS), 0);
         assert_int_equal(scanhead_points(sh, &f, 0, p, 4), 4);
-        assert_true(fabs(p[0].y - (k == 0 ? -179.9998 : -179.9996)) < 1e-12);
-        assert_true(fabs(p[1].y - (k == 0 ? 179.9996 : 179.9998)) < 1e-12);
+        assert_true(fabs(p[0].y - (k % 2 == 0 ? -179.9998 : -179.9996)) < 1e-12);
+        assert_true(fabs(p[1].y - (k % 2 == 0 ? 179.9996 : 179.9998)) < 1e-12);
         assert_true(fabs(p[2].x - 45.018) < 1e-12 && fabs(p[3].z - 105) < 1e-12);
         const double e2 = (2 - 1 / 298.257223563) / 298.257223563, s = sin(45.009 * M_PI / 180);
-        const double meridian_m = 6378137.0 * (1 - e2) / pow(1 - e2 * s * s, 1.5) + 100;
+        const double meridian_m = 6378137.0 * (1 - e2) / pow(1 - e2 * s * s, 1.5) + anchor.height_m;
         assert_true(fabs(p[2].range_m - 0.018 * M_PI / 180 * meridian_m) < 1e-3);
         assert_true(fabs(p[3].range_m - 5) < 1e-8); /* differences of 6.4e6 m */
         close(head);

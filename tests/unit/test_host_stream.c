@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* libscanhead: its counts, hash and refusals of a stream. */
+#include <fcntl.h>
 #include <nettle/sha2.h>
 
 #include "tests/unit/host_rig.h"
@@ -92,39 +93,85 @@ static void test_restart(void **state)
     scanhead_close(sh);
 }
 
-/* Another sequence begins with a descriptor equal to the last one. It is dropped as repeated, and still holds. */
+/* Puts descriptor, anchor, clock and points, numbers 0 to 3; the first `leave_out` of them are not there. */
+static void put_sequence(int fd, int leave_out, uint64_t pulse0)
+{
+    rig_begin_sequence();
+    for (int i = 0; i < leave_out; i++)
+        rig_next_seq();
+    if (leave_out <= 0) put_descriptor(fd, 0, 1, 0);
+    if (leave_out <= 1) put_anchor(fd, 0);
+    if (leave_out <= 2) put_event(fd, NATIVE_EV_TIME, 0, 1, 1000000000, 0);
+    put_points(fd, 3, pulse0);
+}
+
+/* Reads frames until the recording ends, and returns how many of its points have a place. The last points must have a
+ * time of the head's clock where `has_clock` says so. */
+static int count_places(struct scanhead *sh, int has_clock)
+{
+    struct scanhead_frame f;
+    struct scanhead_point point[3];
+    double gps_s;
+    int n = 0, rc;
+    while ((rc = scanhead_next(sh, &f, WAIT_MS)) == 0)
+        if (f.type == SCANHEAD_POINTS) n += scanhead_points(sh, &f, 0, point, 3) == 3 ? 3 : 0;
+    assert_int_equal(rc, SCANHEAD_ECLOSED);
+    assert_int_equal(scanhead_gps_time(sh, 0, &gps_s), has_clock ? 0 : SCANHEAD_ESTATE);
+    scanhead_close(sh);
+    return n;
+}
+
+/* Two recordings are put together, and the second begins with frames of the first. These are dropped as repeated, and
+ * hold for the second one, too. Where only the descriptor is the same, the points wait for their own anchor. */
 static void test_alike(void **state)
 {
     (void)state;
-    int head;
-    struct scanhead *sh = open_pair(&head);
-    struct scanhead_frame f;
-    struct scanhead_point point[3];
-    struct native_descriptor d = make_descriptor(0, 1);
-    struct native_anchor anchor = make_anchor();
-    put_descriptor(head, 0, 1, 0);
-    expect_frame(sh, SCANHEAD_DESCRIPTOR, &f);
-    put_anchor(head, 0);
-    expect_frame(sh, SCANHEAD_ANCHOR, &f);
-    put_points(head, 3, 500);
-    expect_frame(sh, SCANHEAD_POINTS, &f);
-    size_t len = native_encode_descriptor(out, sizeof out, &d, 1, 0);
-    native_finish_frame(out, 0);
-    put_all(head, out, len);
-    anchor.station++;
-    len = native_encode_anchor(out, sizeof out, &anchor, 1, 0);
-    native_finish_frame(out, 1);
-    put_all(head, out, len);
-    expect_frame(sh, SCANHEAD_ANCHOR, &f);
-    put_points(head, 3, 100);
-    expect_frame(sh, SCANHEAD_POINTS, &f);
-    assert_int_equal(scanhead_points(sh, &f, 0, point, 3), 3);
-    close(head);
-    scanhead_close(sh);
+    for (uint64_t pulse0 = 50; pulse0 <= 150; pulse0 += 100) {
+        const int fd = rig_write_recording();
+        put_sequence(fd, 0, 100);
+        put_sequence(fd, 0, pulse0);
+        assert_int_equal(count_places(rig_read_recording(fd), 1), 6);
+    }
+    for (int has_anchor = 0; has_anchor <= 1; has_anchor++) {
+        const int fd = rig_write_recording();
+        put_sequence(fd, 0, 100);
+        rig_begin_sequence();
+        put_descriptor(fd, 0, 1, 0);
+        if (has_anchor) put_event(fd, NATIVE_EV_TIME, 0, 1, 5, 0);
+        if (has_anchor) put_anchor(fd, 0);
+        put_points(fd, 3, 150);
+        assert_int_equal(count_places(rig_read_recording(fd), has_anchor), has_anchor ? 6 : 3);
+    }
 }
 
-/* A repeated frame, or a descriptor for this reader alone, holds for a sequence that begins right after it. Once
- * another frame has come between, it doesn't hold. */
+/* What the stream has said is void for a new sequence: with the last frame's own number, after a frame that came twice,
+ * or after copies that don't lead up to it. */
+static void test_void_after_restart(void **state)
+{
+    (void)state;
+    int fd = rig_write_recording(); /* numbers 0 1 2 3, then 3 with other points */
+    put_sequence(fd, 0, 100);
+    put_sequence(fd, 3, 150);
+    assert_int_equal(count_places(rig_read_recording(fd), 0), 3);
+    fd = rig_write_recording(); /* numbers 0 1 2 3 3, then 2 */
+    put_sequence(fd, 0, 100);
+    put_all(fd, out, native_frame_len(out));
+    rig_begin_sequence();
+    rig_next_seq();
+    rig_next_seq();
+    put_points(fd, 3, 150);
+    assert_int_equal(count_places(rig_read_recording(fd), 0), 3);
+    fd = rig_write_recording(); /* numbers 0 1 2 3 0 1, then 3 with other points */
+    put_sequence(fd, 0, 100);
+    rig_begin_sequence();
+    put_descriptor(fd, 0, 1, 0);
+    put_anchor(fd, 0);
+    put_sequence(fd, 3, 150);
+    assert_int_equal(count_places(rig_read_recording(fd), 0), 3);
+}
+
+/* A descriptor for this reader alone holds for a sequence that begins right after it. Once another frame has come
+ * between, it doesn't hold, nor does a frame that came twice. */
 static void test_alike_long_ago(void **state)
 {
     (void)state;
@@ -212,6 +259,27 @@ static void test_any_start(void **state)
     scanhead_close(sh);
 }
 
+/* The handle does not wait on its descriptor, though a copy of it may belong to the caller. Once closed, the copy is as
+ * it was. */
+static void test_flags_of_a_copy(void **state)
+{
+    (void)state;
+    for (int blocks = 0; blocks <= 1; blocks++) {
+        int fd[2];
+        char source[32];
+        struct scanhead *sh;
+        assert_int_equal(socketpair(AF_UNIX, SOCK_STREAM | (blocks ? 0 : SOCK_NONBLOCK), 0, fd), 0);
+        const int copy = dup(fd[0]), before = fcntl(copy, F_GETFL);
+        snprintf(source, sizeof source, "fd:%d", fd[0]);
+        assert_int_equal(scanhead_open(source, &sh, NULL, 0), 0);
+        assert_int_equal(fcntl(copy, F_GETFL), before | O_NONBLOCK);
+        scanhead_close(sh);
+        assert_int_equal(fcntl(copy, F_GETFL), before);
+        close(copy);
+        close(fd[1]);
+    }
+}
+
 static void hash_frame(struct sha256_ctx *ctx, const uint8_t *frame, size_t len)
 {
     sha256_update(ctx, 1, frame + 1);
@@ -267,10 +335,16 @@ static void test_hash(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_stats),      cmocka_unit_test(test_version_and_types),
-        cmocka_unit_test(test_restart),    cmocka_unit_test(test_alike_long_ago),
-        cmocka_unit_test(test_told_alone), cmocka_unit_test(test_alike),
-        cmocka_unit_test(test_any_start),  cmocka_unit_test(test_hash),
+        cmocka_unit_test(test_stats),
+        cmocka_unit_test(test_version_and_types),
+        cmocka_unit_test(test_restart),
+        cmocka_unit_test(test_alike_long_ago),
+        cmocka_unit_test(test_told_alone),
+        cmocka_unit_test(test_alike),
+        cmocka_unit_test(test_any_start),
+        cmocka_unit_test(test_hash),
+        cmocka_unit_test(test_void_after_restart),
+        cmocka_unit_test(test_flags_of_a_copy),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

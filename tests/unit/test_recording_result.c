@@ -35,7 +35,8 @@ static struct recording_result a_result(void)
                    .late = 22,
                    .restarts = 23,
                    .dropped = 24,
-                   .reader_lost = 25},
+                   .reader_lost = 25,
+                   .refused = 29},
         .sha256 = "12ab",
         .replugs = 26,
         .broken_scans = 27,
@@ -63,23 +64,24 @@ static void each_key(void **state)
     expect(&result,
            "{\"points\":1,\"empty_shots\":2,\"pulses\":6000,\"fired_pulses\":7,\"cast_pulses\":8,\"lost_pulses\":9,"
            "\"missing_pulses\":11,\"reader_lost_pulses\":10,\"scans\":5,\"frames\":16,\"bytes\":17,\"bad_payload\":18,"
-           "\"bad_bytes\":19,\"seq_lost\":20,\"repeated\":21,\"late\":22,\"restarts\":23,\"dropped\":24,"
+           "\"bad_bytes\":19,\"seq_lost\":20,\"repeated\":21,\"late\":22,\"restarts\":23,\"refused\":29,\"dropped\":24,"
            "\"reader_lost_frames\":25,\"crowded_echoes\":12,\"faint_hits\":13,\"unfit_echoes\":14,\"lost_samples\":15,"
            "\"replugs\":26,\"bus_resets\":28,\"wall_s\":4,",
            ",\"pulses_per_s\":1500,\"stream_sha256\":\"12ab\"}\n");
     result.counts.unknown = 1; /* then three counts are not known */
-    expect(&result,
-           "{\"points\":1,\"empty_shots\":2,\"pulses\":6000,\"fired_pulses\":null,\"cast_pulses\":null,"
-           "\"lost_pulses\":9,\"missing_pulses\":null,\"reader_lost_pulses\":10,\"scans\":5,\"frames\":16,"
-           "\"bytes\":17,\"bad_payload\":18,\"bad_bytes\":19,\"seq_lost\":20,\"repeated\":21,\"late\":22,"
-           "\"restarts\":23,\"dropped\":24,\"reader_lost_frames\":25,\"crowded_echoes\":12,\"faint_hits\":13,"
-           "\"unfit_echoes\":14,\"lost_samples\":15,\"replugs\":26,\"bus_resets\":28,\"wall_s\":4,",
-           ",\"pulses_per_s\":1500,\"stream_sha256\":\"12ab\"}\n");
+    expect(
+        &result,
+        "{\"points\":1,\"empty_shots\":2,\"pulses\":6000,\"fired_pulses\":null,\"cast_pulses\":null,"
+        "\"lost_pulses\":9,\"missing_pulses\":null,\"reader_lost_pulses\":10,\"scans\":5,\"frames\":16,"
+        "\"bytes\":17,\"bad_payload\":18,\"bad_bytes\":19,\"seq_lost\":20,\"repeated\":21,\"late\":22,"
+        "\"restarts\":23,\"refused\":29,\"dropped\":24,\"reader_lost_frames\":25,\"crowded_echoes\":12,\"faint_hits\":13,"
+        "\"unfit_echoes\":14,\"lost_samples\":15,\"replugs\":26,\"bus_resets\":28,\"wall_s\":4,",
+        ",\"pulses_per_s\":1500,\"stream_sha256\":\"12ab\"}\n");
     result = (struct recording_result){.points = 1};
     expect(&result,
            "{\"points\":1,\"empty_shots\":0,\"pulses\":0,\"fired_pulses\":0,\"cast_pulses\":0,\"lost_pulses\":0,"
            "\"missing_pulses\":0,\"reader_lost_pulses\":0,\"scans\":0,\"frames\":0,\"bytes\":0,\"bad_payload\":0,"
-           "\"bad_bytes\":0,\"seq_lost\":0,\"repeated\":0,\"late\":0,\"restarts\":0,\"dropped\":0,"
+           "\"bad_bytes\":0,\"seq_lost\":0,\"repeated\":0,\"late\":0,\"restarts\":0,\"refused\":0,\"dropped\":0,"
            "\"reader_lost_frames\":0,\"crowded_echoes\":0,\"faint_hits\":0,\"unfit_echoes\":0,\"lost_samples\":0,"
            "\"replugs\":0,\"bus_resets\":0,\"wall_s\":0,",
            ",\"pulses_per_s\":0,\"stream_sha256\":null}\n");
@@ -138,6 +140,11 @@ static void missing_parts_are_named(void **state)
         &r, SH_EIO,
         "the recording is not complete: 321 frames lost to this reader, 0 pulses by the head; of the pulses that "
         "it sent 4 are missing");
+    r.stream.refused = 4000; /* frames that came, with contents that are wrong */
+    incomplete(&r, SH_EIO,
+               "the recording is not complete: 4321 frames lost to this reader (4000 for their contents or version), 0 "
+               "pulses by the head; of the pulses that it sent 4 are missing");
+    r.stream.refused = 0;
     struct recording_result joined = {.counts = {.missing = 4}, .unplaced = 3};
     incomplete(&joined, SH_OK, ""); /* of a live stream: the recorder came within the scan */
     joined.is_file = 1;

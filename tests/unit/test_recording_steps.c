@@ -338,6 +338,22 @@ static void a_listener(void **state)
     expect("");
 }
 
+/* Frames that the library refuses end no recording. The first one is named; an end that is among them is asked for. */
+static void frames_that_are_refused(void **state)
+{
+    static const struct turn script[] = {
+        POINTS(1, 1), {.rc = 2, .frame = {.seq = 7}}, {.rc = 2, .frame = {.seq = 8}}, POINTS(1, 2), OVER(1), LAST};
+    (void)state;
+    turns = script;
+    run_it(SH_OK);
+    assert_int_equal(result.counts.scans, 1);
+    assert_string_equal(warned, "frame 7 at byte 1234 is left out: it is wrong\n");
+    make_recording(NULL);
+    stats.refused = 1; /* the head is idle, and nothing more comes */
+    run_it(SH_OK);
+    assert_string_equal(warned, "the scan's end was lost; the head is idle\n");
+}
+
 /* ---- a head that goes and comes back */
 
 static void a_head_that_is_gone(void **state)
@@ -418,6 +434,7 @@ int main(void)
         cmocka_unit_test_setup(interruptions, make_recording),
         cmocka_unit_test_setup(shares, make_recording),
         cmocka_unit_test_setup(a_listener, make_recording),
+        cmocka_unit_test_setup(frames_that_are_refused, make_recording),
         cmocka_unit_test_setup(a_head_that_is_gone, make_recording),
         cmocka_unit_test_setup(scans_that_are_broken, make_recording),
     };

@@ -2,7 +2,9 @@
 """The Python client at one end of a socket pair, where the test is the head: wrong calls, replies that come late, frames
 that are hurt or missing. python_client.py runs these."""
 import contextlib
+import hashlib
 import io
+import math
 import os
 import socket
 import struct
@@ -58,6 +60,7 @@ def misuse(path):
     late_answer()
     half_a_frame()
     dropped_frames()
+    alike(path + ".alike")
     whole_frame()
     print("refused")
 
@@ -187,19 +190,63 @@ def dropped_frames():
     scanhead._QUEUE_BYTES = most
 
 
-def alike():
-    """A new sequence begins with the frame that came last. The client drops it as repeated, and keeps its state."""
+def restarted():
+    """The state of a sequence is void for the next one: after a frame that came twice, and where the next one begins
+    with the last frame's own number."""
+    for kinds_and_numbers in (((200, 6), (200, 6), (201, 5)), ((200, 6), (201, 6))):
+        head, theirs = pair()
+        theirs.sendall(b"".join(framed(kind, 0, 0, b"", seq) for kind, seq in kinds_and_numbers))
+        head.next_frame(5)
+        head.descriptor, head.anchor, head._gps = {}, {}, (0, 0)
+        assert head.next_frame(5).type == 201 and head.descriptor is None and head.gps_time_ns(0) is None
+
+
+def later_version():
+    """A frame of another version is refused, and the next one comes. The hash is over both, as COUNTS.md says."""
     head, theirs = pair()
-    first, other = (framed(kind, 0, 0, b"", seq) for kind, seq in ((200, 6), (201, 5)))
-    theirs.sendall(first + first + other)
-    head.next_frame(5)
-    head.descriptor = {}
-    assert head.next_frame(5).seq == 5 and head.descriptor == {}
+    later = bytearray(framed(scanhead.LINE_END, 0, 3, b"abc", 0))
+    later[2] = 2
+    later[24:28] = struct.pack("<I", scanhead.crc32c(bytes(later[:24])))
+    theirs.sendall(bytes(later) + framed(200, 0, 0, b"", 1))
+    assert "version 2" in refused(head.next_frame, 5)
+    assert head.next_frame(5).seq == 1
+    assert head.stream_sha256() == hashlib.sha256(b"\x04\x03\0\0\0abc").hexdigest()
+
+
+def geoid_range():
+    """A range along the meridian, by its radius of curvature and the ellipsoidal height. With heights above the geoid the
+    47 m below it count, too: they are 15 mm of the range."""
+    record = struct.pack("<iiIhHI", 1800000, 0, 0, 0, 0, 0x11000000)
+    e2 = (2 - 1 / 298.257223563) / 298.257223563
+    for heights, height_m in ((0, 100.0), (1, 147.0)):
+        raw = scanhead._raw_columns(bytes(40) + record, 1)
+        points = scanhead._common(raw, 0, scanhead.GEO)
+        scanhead._geo_points(points, raw, {"crs": scanhead.CRS_GEODETIC, "moving": 0, "heights": heights,
+                                           "height_m": height_m, "anchor": (45.0, 13.0, 100.0),
+                                           "scale": (1e-8, 1e-8, 1e-3)})
+        radius_m = 6378137.0 * (1 - e2) / (1 - e2 * math.sin(math.radians(45.009))**2)**1.5 + height_m
+        assert abs(points.range_m[0] - math.radians(0.018) * radius_m) < 1e-3, (heights, points.range_m[0])
+
+
+def alike(path):
+    """Two recordings are put together. The second begins with two frames of the first, which hold for it, too."""
+    with open(path, "wb") as file:
+        for kind, seq in ((200, 5), (201, 6), (202, 7), (200, 5), (201, 6), (203, 7), (204, 8)):
+            file.write(framed(kind, 0, 0, b"", seq))
+    for anchor_seq, has_anchor in ((6, True), (7, False), (4, False)):
+        head = scanhead.open(path)
+        assert [head.next_frame().type for _ in range(3)] == [200, 201, 202]
+        head.descriptor, head.anchor, head._descriptor_seq, head._anchor_seq = {}, {}, 5, anchor_seq
+        for kind in (203, 204):
+            assert head.next_frame().type == kind
+            assert head.descriptor == {} and (head.anchor == {}) == has_anchor, (anchor_seq, kind)
 
 
 def notices():
     """A live head's faults are noticed once each, at their byte, before the frame that follows them."""
-    alike()
+    restarted()
+    later_version()
+    geoid_range()
     said = []
     head, theirs = pair()
     head.on_notice = lambda n: said.append(tuple(n)[:4])

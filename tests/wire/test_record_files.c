@@ -203,7 +203,15 @@ static void test_same_time_in_each_run(void **state)
 
 /* ---- completing a file */
 
-static void put_shot(FILE *out, uint32_t line, uint64_t pulse0)
+/* Writes a frame of len bytes, with its number in the file. */
+static void put_numbered(FILE *out, uint8_t *frame, size_t len, uint32_t seq)
+{
+    assert_true(len > 0);
+    native_finish_frame(frame, seq);
+    assert_int_equal(fwrite(frame, 1, len, out), len);
+}
+
+static void put_shot(FILE *out, uint32_t seq, uint32_t line, uint64_t pulse0)
 {
     static uint8_t buf[1024];
     uint32_t x[1] = {1000}, dt_ns[1] = {0};
@@ -221,8 +229,7 @@ static void put_shot(FILE *out, uint32_t line, uint64_t pulse0)
                                .refl_cdb = refl_cdb,
                                .echo = echo,
                                .label = label};
-    size_t len = native_encode_points(buf, sizeof buf, &block, 0);
-    assert_true(len > 0 && fwrite(buf, 1, len, out) == len);
+    put_numbered(out, buf, native_encode_points(buf, sizeof buf, &block, 0), seq);
 }
 
 /* Writes a scan whose descriptor has no end, and a shot in each of two lines of it. Returns the file's size. */
@@ -233,16 +240,13 @@ static size_t write_two_lines(const struct wire *wire, const char *name, uint32_
     struct native_anchor a = {.station = 1, .scale_m = 1e-3, .rotation = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
     FILE *out = fopen(wire_path(wire, name), "wb");
     assert_non_null(out);
-    size_t len = native_encode_descriptor(buf, sizeof buf, &d, 0, 0);
-    assert_int_equal(fwrite(buf, 1, len, out), len);
-    len = native_encode_anchor(buf, sizeof buf, &a, 0, 0);
-    assert_int_equal(fwrite(buf, 1, len, out), len);
-    put_shot(out, 0, 0);
-    put_shot(out, line, line);
-    struct native_event end = {.code = NATIVE_EV_SCAN_END, .b = 2};
-    len = native_encode_event(buf, sizeof buf, &end, 0, 0);
-    assert_int_equal(fwrite(buf, 1, len, out), len);
-    len = (size_t)ftell(out);
+    put_numbered(out, buf, native_encode_descriptor(buf, sizeof buf, &d, 0, 0), 0);
+    put_numbered(out, buf, native_encode_anchor(buf, sizeof buf, &a, 0, 0), 1);
+    put_shot(out, 2, 0, 0);
+    put_shot(out, 3, line, line);
+    const struct native_event end = {.code = NATIVE_EV_SCAN_END, .b = 2};
+    put_numbered(out, buf, native_encode_event(buf, sizeof buf, &end, 0, 0), 4);
+    const size_t len = (size_t)ftell(out);
     assert_int_equal(fclose(out), 0);
     return len;
 }

@@ -31,6 +31,43 @@ static void test_cut_and_bad_bytes(void **state)
     replay_same_file(wire, "out.shs", "bad.shs");
 }
 
+/* A whole frame in the middle has a version of later times. Each reader leaves out that frame alone: a replay, which
+ * says so, and a recorder, whose recording is then not complete. */
+static void test_another_version(void **state)
+{
+    struct wire *wire = *state;
+    static const char *const quiet[] = {NULL};
+    struct tape all = {0}, rest = {0};
+    uint32_t i = 0;
+    size_t n;
+    record(wire, "head.shs");
+    char *bytes = wire_read(file, &n);
+    tape_read(file, &all);
+    while (all.frame[i].type != NATIVE_POINTS || i < all.n / 2)
+        i++;
+    bytes[all.frame[i].at + 2] = NATIVE_VERSION + 1;
+    native_finish_frame((uint8_t *)bytes + all.frame[i].at, all.frame[i].seq);
+    snprintf(file, sizeof file, "%s", wire_write(wire, "later.shs", bytes, n));
+    free(bytes);
+    replay_to_file(wire, file, quiet, "out.shs");
+    replay_said(wire, "1 frames left out, which have wrong contents or another version");
+    tape_read(wire_path(wire, "out.shs"), &rest);
+    assert_int_equal(rest.n, all.n - 1);
+    assert_memory_equal(rest.bytes, all.bytes, all.frame[i].at);
+    assert_memory_equal(rest.bytes + all.frame[i].at, all.bytes + all.frame[i].at + all.frame[i].len,
+                        all.len - all.frame[i].at - all.frame[i].len);
+    char ply[352], where[64];
+    snprintf(ply, sizeof ply, "%s", wire_path(wire, "out.ply"));
+    const char *const args[] = {"record", file, "-o", ply, NULL};
+    assert_int_equal(replay_call(wire, args), 1);
+    snprintf(where, sizeof where, "frame %u at byte %zu is left out: ", (unsigned)all.frame[i].seq, all.frame[i].at);
+    replay_said(wire, where);
+    replay_said(wire, "is not complete: 1 frames lost to this reader (1 for their contents or version)");
+    assert_int_equal(access(ply, R_OK), 0);
+    tape_free(&all);
+    tape_free(&rest);
+}
+
 /* The error is one line. The status is 1 for a file that is no recording, 2 for one that can't be opened. */
 static void refused(struct wire *wire, const char *path, int status, const char *why)
 {
@@ -134,6 +171,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_cut_and_bad_bytes, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_another_version, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_no_recordings, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_absurd_numbers, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_hostile_name, wire_setup, wire_teardown),

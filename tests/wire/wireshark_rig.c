@@ -100,6 +100,13 @@ static void write_long(void)
     free(all);
 }
 
+/* Heights of an anchor are above a geoid that is 47.3 m higher than the ellipsoid. The ranges stay, as do all places. */
+static void put_on_geoid(uint8_t *anchor)
+{
+    le_put_double(anchor + 32, le_get_double(anchor + 32) - 47.3);
+    le_put32(anchor + 192, NATIVE_HEIGHTS_GEOID);
+}
+
 /* Each stream gets sequence numbers of its own, so that they can follow each other: between two there is a jump
  * forward. */
 static void number_all(void)
@@ -111,6 +118,8 @@ static void number_all(void)
         for (size_t at = 0; at < len; at += native_frame_len((uint8_t *)bytes + at)) {
             uint8_t *frame = (uint8_t *)bytes + at;
             if ((frame[3] & NATIVE_LOCAL) == 0) le_put32(frame + 8, le_get32(frame + 8) + 100000u * (uint32_t)i);
+            if (frame[1] == NATIVE_ANCHOR && strcmp(stream_name[i], "geodetic.shs") == 0)
+                put_on_geoid(frame + NATIVE_HEADER_LEN);
             seal_frame(frame);
         }
         wire_write(wire, stream_name[i], bytes, len);

@@ -12,7 +12,8 @@
 
 The wire is described in drivers/protocol/PROTOCOL.md and its pages, section by section. Columns of
 points are numpy arrays where numpy is installed, else lists; the numbers are the same, to the last bit those
-of libscanhead. Units are in names: _m metres, _rad radians, _deg degrees, _ns nanoseconds, _db decibels.
+of libscanhead (range_m of geodetic points: to 2e-8 m). Units are in names: _m metres, _rad radians, _deg degrees,
+_ns nanoseconds, _db decibels.
 NaN: no value. Errors are exceptions. A Head belongs to one thread at a time.
 
 Memory is bounded: a frame and a chunk of bytes (128 KiB), 64 MiB of frames that came while a reply was awaited,
@@ -306,6 +307,7 @@ class _Sequence:
         self._gaps = collections.deque(maxlen=_GAPS)  # [first number, how many]
         self._local = None  # type: Optional[Tuple]
         self._last_late, self._late_run = 0, 0  # the last late frame; how many came in a row up to it
+        self.again, self._again_next = 0, 0  # repeated frames that came last, with numbers up to _again_next - 1
 
     def take(self, frame: Tuple) -> Tuple[str, int, int]:
         """frame: its number, its flags, and all that tells it from others. Returns the kind of its notice ("": there is
@@ -317,7 +319,11 @@ class _Sequence:
             return kind, seq, 1
         self._local = None
         kind, first, n = ("", seq, 1) if seq == self._next or self._next is None else self._jump(frame)
-        if kind != "repeated":
+        if seq != self._again_next:
+            self.again = 0
+        if kind == "repeated":
+            self.again, self._again_next = self.again + 1, (seq + 1) % 2**32
+        else:
             self._seen.append(frame)
         if kind not in ("repeated", "late"):
             self._next, self._late_run = (seq + 1) % 2**32, 0
@@ -491,6 +497,10 @@ class Parser:
             return _DROPPED, False
         self.frames += 1
         return Frame(kind, version, flags, seq, t_ns, payload, {}), False
+
+    def frames_again(self) -> int:
+        """How many repeated frames came last, with consecutive numbers up to the last whole frame's."""
+        return self._sequence.again
 
     def _is_dropped(self, frame: Tuple) -> bool:
         kind, first, n = self._sequence.take(frame)
@@ -738,8 +748,10 @@ def _geo_points(p: Points, raw, a: Dict) -> None:
     if a["moving"] & 1:
         p.range_m = _column((_NAN for _ in range(len(p))), len(p))
     elif a["crs"] == CRS_GEODETIC:
-        home = geodetic_to_ecef(*a["anchor"])
-        p.range_m = _mapped(lambda *at: _distance(geodetic_to_ecef(*at), home), x, y, z)
+        lat_deg, lon_deg, height_m = a["anchor"]
+        geoid_m = a["height_m"] - height_m if a["heights"] == 1 else 0.0
+        home = geodetic_to_ecef(lat_deg, lon_deg, height_m + geoid_m)
+        p.range_m = _mapped(lambda lat, lon, h: _distance(geodetic_to_ecef(lat, lon, h + geoid_m), home), x, y, z)
     else:
         p.range_m = _mapped(_length, *d)
     p.x, p.y, p.z, p.range_m = (_empty_as_nan(c, p.echo_count) for c in (x, y, z, p.range_m))
@@ -1159,7 +1171,8 @@ class Head:
         self._poses, self._earth = _Poses(), None
         self._sha256 = hashlib.sha256()
         self._scan_t0_ns = self._gps = self._last_pulse0 = self._points_key = self._points_time = None
-        self._last_seq, self._last_repeated = None, 0  # of a frame that is not LOCAL; how many were repeated up to it
+        self._last_seq = None  # type: Optional[int]  # of a frame that is not LOCAL
+        self._descriptor_seq = self._anchor_seq = self._gps_seq = 0  # frames that gave what is at hand
         self._told_alone = False  # whether a descriptor for this reader alone came after _last_seq
         self._scan, self.scan_over = None, False  # the number of the present scan; whether it ends with this frame
 
@@ -1418,12 +1431,12 @@ class Head:
         return self._absorb(frame)
 
     def _absorb(self, frame: Frame) -> Frame:
-        if frame.version != 1:
-            raise ScanheadError(f"the head speaks version {frame.version}; this client reads 1")
         if not frame.flags & (REPEAT | LOCAL) and frame.type in _HASHED:
             self._sha256.update(struct.pack("<BI", frame.type, len(frame.payload)))
             self._sha256.update(frame.payload)
         self._follow_sequence(frame)
+        if frame.version != 1:
+            raise ScanheadError(f"the head speaks version {frame.version}; this client reads 1")
         if frame.type in _UNPACK:
             frame = frame._replace(fields=_decode(frame.type, frame.payload))
         act = {DESCRIPTOR: self._absorb_descriptor, ANCHOR: self._absorb_anchor,
@@ -1436,21 +1449,30 @@ class Head:
         self._follow_scan(frame, is_again)
         return frame
 
+    def _came_again(self, frame: Frame, seq: int) -> bool:
+        """Whether a recording holds a second copy of frame `seq` right before this one. Recordings that were put one
+        after the other may begin with the same frames. The parser drops the second copies as repeated, up to the first
+        frame that differs. The state that comes from such a frame is that of the new sequence, too."""
+        return self._source.is_file and (frame.seq - 1 - seq) % 2**32 < self.parser.frames_again()
+
     def _follow_sequence(self, frame: Frame) -> None:
-        """Forgets the state where the numbers of frames go back: the head has started again, or recordings were put
-        one after the other. The state is kept in two cases. If the new sequence began with frames equal to earlier
-        ones (repeated), the state from those holds for it, too. If a descriptor for this reader alone (LOCAL) came just
-        before, the state since then is that of the new sequence."""
+        """Forgets the state where the numbers of frames do not go on: the head has started again, or recordings were put
+        one after the other. If a descriptor for this reader alone (LOCAL) came just before, the state since then is
+        that of the new sequence."""
         if frame.flags & LOCAL:
             return
-        repeated = self.parser.repeated
-        back = self._last_seq is not None and (frame.seq - self._last_seq) % 2**32 >= 2**31
+        back = self._last_seq is not None and (frame.seq - self._last_seq - 1) % 2**32 >= 2**31
         if back:
             self._last_pulse0 = None
-        if back and repeated == self._last_repeated and not self._told_alone:
+        if back and not self._told_alone:
+            kept = self.descriptor, self.anchor, self.emitter
             self._forget()
-            self._gps = self._scan_t0_ns = None
-        self._last_seq, self._last_repeated, self._told_alone = frame.seq, repeated, False
+            if self._came_again(frame, self._descriptor_seq):
+                self.descriptor, _, self.emitter = kept
+                self.anchor = kept[1] if self._came_again(frame, self._anchor_seq) else None
+            self._gps = self._gps if self._came_again(frame, self._gps_seq) else None
+            self._scan_t0_ns = None
+        self._last_seq, self._told_alone = frame.seq, False
 
     def _follow_scan(self, frame: Frame, is_again: bool) -> None:
         """Sets scan_over. is_again: a scan of the same number begins. SCAN_END may be lost: so the next frame that
@@ -1494,6 +1516,7 @@ class Head:
             raise ScanheadError("a polar descriptor without scales")
         if not frame.flags & REPEAT or self.descriptor is None or self.descriptor["scan"] != d["scan"]:
             self._forget()
+            self._descriptor_seq = frame.seq
         self.descriptor = d
         self._told_alone |= frame.flags & LOCAL != 0
 
@@ -1511,6 +1534,8 @@ class Head:
         a["axes"] = a["axes"] if any(a["axes"]) else (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
         if a["crs"] > CRS_GEODETIC or a["heights"] > 1:
             raise ScanheadError("an anchor in a CRS that version 1 doesn't have")
+        if self.anchor is None or not frame.flags & REPEAT:
+            self._anchor_seq = frame.seq
         if self.descriptor is not None:  # without its scan's descriptor, an anchor may be one of the scan before
             self.anchor, self._earth = a, None
 
@@ -1550,6 +1575,8 @@ class Head:
 
     def _absorb_event(self, frame: Frame) -> None:
         code, a, b, c = (frame.fields[k] for k in ("code", "a", "b", "c"))
+        if code in (EV_SCAN_START, EV_TIME, EV_PPS):
+            self._gps_seq = frame.seq
         if code == EV_READER_LOST:
             self._left_out_before += self._left_out if c < self._left_out else 0  # another session has begun
             self._left_out = c

@@ -136,6 +136,11 @@ function sceneTurn(a, grid) {
   return (d) => transposedTimes(a.axes, transposedTimes(north, transposedTimes(east, d)));
 }
 
+/** Returns the geoid's height above the ellipsoid if heights of the anchor's CRS are above the geoid; else 0. */
+export function geoidHeight(a) {
+  return a.heights === 1 && (a.moving & 1) === 0 ? a.height_m - a.anchor[2] : 0;
+}
+
 /** Returns {at, isFlat}. at([x, y, z]) takes a place in the anchor's CRS to the scene frame, metres. isFlat: at() is
  * only the anchor's axes, transposed, and a shift. If a head moves and heights are above the geoid, the geoid's height
  * is not known. Heights are then taken as ellipsoidal, and the whole scene is too low or too high by the geoid's
@@ -143,7 +148,7 @@ function sceneTurn(a, grid) {
 export function toScene(a) {
   const shift = (p) => plus(a.station_m, transposedTimes(a.axes, minus(p, a.anchor)));
   if (a.crs === 0) return {isFlat: true, at: shift};
-  const geoid_m = a.heights === 1 && (a.moving & 1) === 0 ? a.height_m - a.anchor[2] : 0;
+  const geoid_m = geoidHeight(a);
   const own = gridOfScene(a), grid = a.crs === 2 ? gridOf(a.epsg) : null;
   const lift_m = a.station_m[2] - a.height_m; // a scene in a grid has heights that differ by this
   if (own !== 0 && own === a.epsg) return {at: (p) => [p[0], p[1], p[2] + geoid_m + lift_m]};

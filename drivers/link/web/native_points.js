@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // The records of a points frame become columns in the scene frame. The module is the hot path: it makes no BigInt for a
 // point, and objects for a point only with geodetic coordinates.
-import {fitCubic, geodeticToEcef, toScene} from './native_earth.js';
+import {fitCubic, geodeticToEcef, geoidHeight, toScene} from './native_earth.js';
 
 const TWO_PI = 6.283185307179586476925, PARTS = 256, HEAD = 40, RECORD = 20, NO_REFLECTANCE = -32768;
 const sinPart = Float64Array.from({length: PARTS}, (_, i) => Math.sin((TWO_PI * i) / PARTS));
@@ -120,12 +120,12 @@ export function geoPlacer(descriptor, anchor) {
   const {at: exactAt, isFlat} = toScene(anchor), [sx, sy, sz] = anchor.scale, isGeodetic = anchor.crs === 3;
   let place = isFlat ? placeFlat(exactAt, anchor) : isGeodetic ? placeExactly(exactAt) : null;
   place ??= placeByCubic(exactAt, anchor, descriptor);
-  const home = isGeodetic ? geodeticToEcef(...anchor.anchor) : null;
-  const [ax, ay, az] = anchor.anchor, moves = anchor.moving & 1;
+  const [ax, ay, az] = anchor.anchor, moves = anchor.moving & 1, az_m = az + geoidHeight(anchor);
+  const home = isGeodetic ? geodeticToEcef(ax, ay, az_m) : null;
   const rangeOf = (dx, dy, dz) => {
     if (moves) return NaN;
     if (!isGeodetic) return Math.sqrt(dx * dx + dy * dy + dz * dz);
-    const e = geodeticToEcef(ax + dx, ay + dy, az + dz);
+    const e = geodeticToEcef(ax + dx, ay + dy, az_m + dz);
     return Math.sqrt((e[0] - home[0]) ** 2 + (e[1] - home[1]) ** 2 + (e[2] - home[2]) ** 2);
   };
   return (c, view, n, pulse0, t0_ns) => {

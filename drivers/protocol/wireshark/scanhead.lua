@@ -604,6 +604,7 @@ local ABSORB = {
                until_ns = 1e6 * number_at(bytes, at + 196)}
     a.x, a.y, a.z, a.scale = unpack_bytes("<dddd", bytes, at + 17)
     a.sx, a.sy, a.sz = unpack_bytes("<ddd", bytes, at + 169)
+    a.height_m = number_at(bytes, at + 192) == 1 and unpack_bytes("<d", bytes, at + 65) or a.z -- ellipsoidal
     if a.sx == 0 then a.sx = a.scale end
     if a.sy == 0 then a.sy = a.scale end
     if a.sz == 0 then a.sz = a.scale end
@@ -822,9 +823,9 @@ local function put_geo(item, wanted, m, tvb, at, a, b, c)
   local x, y, z, range = anchor.x + dx, anchor.y + dy, anchor.z + dz, nil
   local unit = anchor.crs == 3 and "°" or "m"
   if anchor.crs == 3 and y > 180 then y = y - 360 elseif anchor.crs == 3 and y < -180 then y = y + 360 end
-  if wanted.range_m and anchor.crs == 3 then
-    local x0, y0, z0 = geocentric(anchor.x, anchor.y, anchor.z)
-    local x1, y1, z1 = geocentric(x, y, z)
+  if wanted.range_m and anchor.crs == 3 and not anchor.moving then
+    local x0, y0, z0 = geocentric(anchor.x, anchor.y, anchor.height_m)
+    local x1, y1, z1 = geocentric(x, y, anchor.height_m + dz)
     range = math.sqrt((x1 - x0) ^ 2 + (y1 - y0) ^ 2 + (z1 - z0) ^ 2)
   elseif wanted.range_m and not anchor.moving then
     range = math.sqrt(dx * dx + dy * dy + dz * dz)

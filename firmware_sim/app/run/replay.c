@@ -75,6 +75,9 @@ static void say_what_ran(const struct run_options *o, struct replay *replay)
     if (s.repeated + s.late != 0)
         sh_warn(&app_report_stderr, "%s: %llu frames left out, which came twice or too late", o->in.operand[0],
                 (unsigned long long)(s.repeated + s.late));
+    if (s.refused != 0)
+        sh_warn(&app_report_stderr, "%s: %llu frames left out, which have wrong contents or another version",
+                o->in.operand[0], (unsigned long long)s.refused);
     if (s.bad_bytes != 0)
         sh_warn(&app_report_stderr, "%s: %llu bytes left out, which belong to no complete frame%s", o->in.operand[0],
                 (unsigned long long)s.bad_bytes, s.cut ? "; its end is cut off" : "");

@@ -117,7 +117,7 @@ int colour_spool_drain(struct colour_spool *spool,
     /* Compares bytes, not numbers of frames: after a replug a frame may equal an earlier one, and the handle then drops
      * it as a repetition. */
     if (rc == SH_OK) scanhead_get_stats(spool->sh, &stats);
-    if (rc == SH_OK && (got != SCANHEAD_ECLOSED || stats.bytes != spool->bytes || stats.bad_bytes != 0))
+    if (rc == SH_OK && (got != SCANHEAD_ECLOSED || stats.bytes != spool->bytes || stats.bad_bytes + stats.refused != 0))
         rc = sh_fail(err, SH_EIO, "%s: the stored frames can't be read back: %s", spool->track.path,
                      scanhead_error(spool->sh));
     return rc;

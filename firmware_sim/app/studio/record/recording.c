@@ -34,6 +34,7 @@ struct recording {
     int stopping;                       /* the scan at hand is to end */
     int scan_started;                   /* SCAN_START or points were seen since SCAN:STAR */
     int scan_over, cut_short, broken;
+    int has_refused;       /* a warning has named the first frame with wrong contents */
     int is_done;           /* the scan is over, and only its final counts are waited for: not for a head that is gone */
     double scan_s, into_s; /* how long the scan lasts, 0: not known; the time since its start */
     uint32_t station;      /* at hand */
@@ -99,7 +100,7 @@ static int has_lost_frames(const struct recording *r)
 {
     struct scanhead_stats stats;
     scanhead_get_stats(r->sh, &stats);
-    return stats.seq_lost + stats.reader_lost + stats.dropped + stats.restarts != 0;
+    return stats.seq_lost + stats.reader_lost + stats.dropped + stats.restarts + stats.refused != 0;
 }
 
 static void count_pulses(struct recording *r, const struct scanhead_frame *frame)
@@ -406,6 +407,16 @@ static int record_stations(struct recording *r, struct sh_err *err)
     return rc;
 }
 
+/* Reports the first frame that is left out for its contents. The result has how many were. */
+static void note(void *ctx, const struct scanhead_notice *notice)
+{
+    struct recording *r = ctx;
+    if (notice->kind != SCANHEAD_NOTICE_REFUSED || r->has_refused) return;
+    r->has_refused = 1;
+    sh_warn(r->o->report, "frame %lu at byte %llu is left out: %s", (unsigned long)notice->seq,
+            (unsigned long long)notice->at_byte, notice->why);
+}
+
 int recording_run(struct scanhead *sh, const struct recording_options *options, struct recording_result *result,
                   struct sh_err *err)
 {
@@ -414,8 +425,10 @@ int recording_run(struct scanhead *sh, const struct recording_options *options, 
     const int64_t start_ns = clock_now_ns();
     struct recording r = {.sh = sh, .o = options, .result = result, .next_report_ns = start_ns + 1000000000};
     if (options->hash) scanhead_hash_start(sh);
+    scanhead_on_notice(sh, note, &r);
     int rc = options->listen ? record_listening(&r, err) : record_stations(&r, err);
     result->wall_s = 1e-9 * (double)(clock_now_ns() - start_ns);
+    scanhead_on_notice(sh, NULL, NULL);
     scanhead_get_stats(sh, &result->stream);
     if (options->hash) scanhead_hash_hex(sh, result->sha256);
     if (rc == SH_ECLOSED && options->listen && result->frames == 0)

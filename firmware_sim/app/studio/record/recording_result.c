@@ -45,6 +45,7 @@ void recording_put(struct json *json, const void *ctx)
     json_uint(json, "repeated", s->repeated);
     json_uint(json, "late", s->late);
     json_uint(json, "restarts", s->restarts);
+    json_uint(json, "refused", s->refused);
     json_uint(json, "dropped", s->dropped);
     json_uint(json, "reader_lost_frames", s->reader_lost);
     json_uint(json, "crowded_echoes", result->crowded);
@@ -92,8 +93,11 @@ int recording_check_complete(const struct recording_result *result, struct sh_er
 {
     const struct scanhead_stats *s = &result->stream;
     /* Frames that never came leave gaps in the sequence. Frames with a wrong checksum leave gaps, too, but not before
-     * the first frame and after the last. */
-    const unsigned long long lost = s->seq_lost + s->bad_unseen + s->dropped;
+     * the first frame and after the last. Refused frames came, but their contents are lost. */
+    const unsigned long long lost = s->seq_lost + s->bad_unseen + s->dropped + s->refused;
+    char refused[64] = "";
+    if (s->refused != 0)
+        snprintf(refused, sizeof refused, " (%llu for their contents or version)", (unsigned long long)s->refused);
     const uint64_t pulses = s->pulses_lost > result->counts.lost ? s->pulses_lost : result->counts.lost;
     if (result->missing[0] != '\0') return sh_fail(err, SH_ESTATE, "interrupted; missing: %s", result->missing);
     if (result->broken_scans != 0)
@@ -104,8 +108,8 @@ int recording_check_complete(const struct recording_result *result, struct sh_er
     if (lost == 0 && pulses == 0) return check_beginning(result, err);
     return sh_fail(
         err, SH_EIO,
-        "the recording is not complete: %llu frames lost to this reader, %llu pulses by the head; of the pulses that "
-        "it sent %s%llu are missing",
-        lost, (unsigned long long)pulses, result->counts.unknown != 0 ? "at least " : "",
+        "the recording is not complete: %llu frames lost to this reader%s, %llu pulses by the head; of the pulses "
+        "that it sent %s%llu are missing",
+        lost, refused, (unsigned long long)pulses, result->counts.unknown != 0 ? "at least " : "",
         (unsigned long long)result->counts.missing);
 }

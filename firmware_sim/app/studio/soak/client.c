@@ -170,19 +170,13 @@ static void reattach(struct recorder *r)
     open_head(r);
 }
 
-/* The library refuses the content of a frame; or the stream ended without a frame, and the connection is over. */
-static void refuse_frame(struct recorder *r)
+/* Either the stream ended without a frame, and the connection is over. Or the stream begins with a frame of another
+ * version: its notice has counted it. */
+static void begin_wrong(struct recorder *r)
 {
     struct scanhead_stats stats;
     scanhead_get_stats(r->link->sh, &stats);
-    if (stats.frames == 0) {
-        reattach(r);
-        return;
-    }
-    pthread_mutex_lock(&r->link->lock);
-    r->link->refused_frames++;
-    r->link->refused_now++;
-    pthread_mutex_unlock(&r->link->lock);
+    if (stats.frames == 0) reattach(r);
 }
 
 static void take_frame(struct recorder *r, const struct scanhead_frame *frame)
@@ -215,7 +209,7 @@ static void step(struct recorder *r)
     case SCANHEAD_ETIMEOUT:
         break;
     case SCANHEAD_EFORMAT:
-        refuse_frame(r);
+        begin_wrong(r);
         break;
     case SCANHEAD_ECLOSED:
     case SCANHEAD_ELOST:

@@ -227,18 +227,6 @@ static void ledger_begin(struct soak_link *link, soak_seq seq)
     link->begun = link->in_session = 1;
 }
 
-/* The library gives no gap for frames that came and that it refused for their content. Marks them as missing here. */
-static void mark_refused(struct soak_link *link, soak_seq to)
-{
-    for (soak_seq seq = link->last + 1; seq < to && link->refused_now > 0; seq++) {
-        struct soak_fact *fact = touch(link, seq);
-        if (fact == NULL || (fact->marks & SOAK_GAP) != 0 || fact->got != 0) continue;
-        fact->marks |= SOAK_GAP;
-        link->refused_now--;
-    }
-    link->refused_now = 0;
-}
-
 static void take_offset(struct soak_link *link, int64_t after_ns)
 {
     if (!link->have_offset || after_ns < link->offset_ns) link->offset_ns = after_ns;
@@ -253,7 +241,6 @@ void soak_saw_frame(struct soak_link *link, const struct scanhead_frame *frame, 
     if (!link->begun) soak_head_begins(link, frame);
     reach(link, seq);
     if (!link->in_session) ledger_begin(link, seq);
-    if (link->refused_now != 0) mark_refused(link, seq);
     struct soak_fact *fact = touch(link, seq);
     link->frames++;
     link->bytes += frame->raw_len;
@@ -310,6 +297,15 @@ static void add_again(struct soak_link *link, const struct scanhead_notice *noti
         fact->repeated++;
 }
 
+/* The library gives no gap for a frame that came and that it refused for its contents. The frame is missing here. */
+static void add_refused(struct soak_link *link, const struct scanhead_notice *notice)
+{
+    link->refused_frames++;
+    if (!link->begun) return;
+    struct soak_fact *fact = touch(link, soak_seq_of(link->soak, notice->seq));
+    if (fact != NULL && fact->got == 0) fact->gap = 1;
+}
+
 void soak_saw_notice(void *ctx, const struct scanhead_notice *notice)
 {
     struct soak_link *link = ctx;
@@ -325,6 +321,9 @@ void soak_saw_notice(void *ctx, const struct scanhead_notice *notice)
     case SCANHEAD_NOTICE_BAD_PAYLOAD:
     case SCANHEAD_NOTICE_BAD_BYTES:
         add_run(link, notice);
+        break;
+    case SCANHEAD_NOTICE_REFUSED:
+        add_refused(link, notice);
         break;
     case SCANHEAD_NOTICE_ECHO:
         link->ask.echoes++;

@@ -40,7 +40,6 @@ struct soak_link {
     soak_seq held_at;     /* `reached` when the clean reader began to wait for the client */
     int64_t held_from_ns; /* clock, then; 0: it does not wait */
     uint64_t frames, bytes, refused_frames, sessions, closings;
-    uint64_t refused_now;       /* frames since the last one that was taken */
     uint64_t lost_plain;        /* frames that are missing without a fault */
     uint64_t reader_lost;       /* frames that the head says it left out, since the client was too slow */
     uint64_t dropped;           /* frames that the client's library dropped while it waited for a reply */

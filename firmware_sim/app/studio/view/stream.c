@@ -148,7 +148,9 @@ static int stream_take_points(void *ctx, int n, struct sh_err *err)
 
 static int frames_lost(const struct scanhead_stats *stats)
 {
-    return stats->seq_lost + stats->reader_lost + stats->dropped + stats->bad_payload + stats->bad_bytes != 0;
+    return stats->seq_lost + stats->reader_lost + stats->dropped + stats->refused + stats->bad_payload +
+               stats->bad_bytes !=
+           0;
 }
 
 static int read_frames(struct viewed_stream *s, struct scanhead *sh, struct sh_err *err)
