@@ -138,8 +138,8 @@ void georef_difference(const struct georef *georef, const double p_crs[3], doubl
  * don't fit otherwise, the scale of longitude alone is coarser, up to 2 pi reach_m / 2^31 on the ground. SH_EINPUT
  * where another coordinate does not fit; the text names the smallest scale_m that would do. */
 int georef_scale(const struct georef *georef, double scale_m, double reach_m, double scale[3], struct sh_err *err);
-/* The largest coordinate of points within reach_m of the centre, relative to the anchor, in metres: more than reach_m by
- * the grid's scale, the geoid and the Earth's curvature. Longitude is left out, since its scale follows. */
+/* The largest coordinate of points within reach_m of the centre, relative to the anchor, in metres: more than reach_m
+ * by the grid's scale, the geoid and the Earth's curvature. Longitude is left out, since its scale follows. */
 double georef_span_m(const struct georef *georef, double reach_m);
 /* The largest length of one count of these scales within reach_m, metres (on the ground, or of the grid):
  * scale_m, or that of longitude. */

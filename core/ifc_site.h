@@ -9,9 +9,9 @@
  * IfcMapConversion.Scale is map units per unit of the model; IfcMapConversionScaled has a factor for each axis as well,
  * and Scale times factor counts. The model is never scaled: factors have to agree within 1 %. Several map conversions
  * have to say the same. Where IfcProjectedCRS has no MapUnit, the map's unit is found from the model's unit divided by
- * Scale. The unit of the system's axes, which PROJ knows, is taken if it is within 1 % of that quotient. Otherwise it is
- * the one that is nearest to the quotient and within 1 %: metre, the model's own unit, foot or US survey foot. If none
- * is, this is an error. */
+ * Scale. The unit of the system's axes, which PROJ knows, is taken if it is within 1 % of that quotient. Otherwise it
+ * is the one that is nearest to the quotient and within 1 %: metre, the model's own unit, foot or US survey foot. If
+ * none is, this is an error. */
 #ifndef CORE_IFC_SITE_H
 #define CORE_IFC_SITE_H
 

@@ -11,8 +11,8 @@ struct text_span build_folder_of(const char *path);
  * The path is to be freed; NULL: there is no memory. */
 char *build_join(struct text_span folder, struct text_span name);
 /* Finds a file in one of the folders: by the whole name, or else by the name's last part. Where neither is there, the
- * case of letters is ignored with any_case, for the whole name (unless it begins with /) and then for its last part. The
- * path is to be freed; NULL: the file is nowhere, or there is no memory. */
+ * case of letters is ignored with any_case, for the whole name (unless it begins with /) and then for its last part.
+ * The path is to be freed; NULL: the file is nowhere, or there is no memory. */
 char *build_find_file(const struct text_span *folder, size_t n, struct text_span name, int any_case);
 
 #endif

@@ -109,8 +109,8 @@ static void find_seen(struct build_shared *b)
             }
 }
 
-/* Counts a triangle or a group in each region of the range, and a triangle's regions. Once all are counted, `write` puts its number into the bins
- * of these regions. */
+/* Counts a triangle or a group in each region of the range, and a triangle's regions. Once all are counted, `write`
+ * puts its number into the bins of these regions. */
 static void put_range(struct build_shared *b, uint32_t face, const struct range *r, uint32_t number, int write)
 {
     for (uint32_t j = r->v0; j <= r->v1; j++)

@@ -116,10 +116,10 @@ struct link_ops {
     /* Largest number of bytes per second this link can carry. NULL where there is no fixed limit. */
     double (*capacity)(const void *link);
 
-    /* Waits up to timeout_ms (-1: for ever) and fills in at most max events; returns how many, or a negative
-     * SH_E, with the reason in errno: the link is over then. want_write: where bit s is set, LINK_WRITABLE is reported when session s can take bytes. A
-     * session whose reader does not read must not make poll return at once. link_poll.h has what the poll functions
-     * of all links need. */
+    /* Waits up to timeout_ms (-1: for ever) and fills in at most max events; returns how many, or a negative SH_E, with
+     * the reason in errno: the link is over then. want_write: where bit s is set, LINK_WRITABLE is reported when
+     * session s can take bytes. A session whose reader does not read must not make poll return at once. link_poll.h has
+     * what the poll functions of all links need. */
     int (*poll)(void *link, int wake_fd, uint32_t want_write, int timeout_ms, struct link_event *events, int max);
 
     /* read and write don't block, except as said above. They return how many bytes were moved; 0: none now; SH_ECLOSED,

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* A GNSS fix goes in, NMEA 0183 sentences (versions 2.3 to 4.0) come out.
  *
- * A sentence is "$", talker and type, fields with commas between, "*", the XOR of all characters between "$"
- * and "*" as two upper-case hex digits, CR LF. The standard allows 82 characters, and readers drop longer ones. Here
- * are 81 at most: readers with a buffer of 80 take these, too. As with survey receivers, minutes have 7 decimals (a step
- * is 0.19 mm), and heights 3. Where that is too long, there are fewer: minutes 6 (1.9 mm); then heights and speeds 2;
- * then minutes 5. The geoid separation has no zeros at its end but the first decimal.
+ * A sentence is "$", talker and type, fields with commas between, "*", the XOR of all characters between "$" and "*" as
+ * two upper-case hex digits, CR LF. The standard allows 82 characters, and readers drop longer ones. Here are 81 at
+ * most: readers with a buffer of 80 take these, too. As with survey receivers, minutes have 7 decimals (a step is 0.19
+ * mm), and heights 3. Where that is too long, there are fewer: minutes 6 (1.9 mm); then heights and speeds 2; then
+ * minutes 5. The geoid separation has no zeros at its end but the first decimal.
  *
  * A field that isn't known is empty. But GSA numbers its satellites from 1 on, since single satellites are not
  * modelled. Without a fix (quality 0) all fields of the position are empty. At rest the course is 000.0.

@@ -41,9 +41,9 @@ int app_fail(const struct sh_err *err);
 /* The same for the first CONFIG_MAX_DIAGNOSTICS errors of a configuration; a last line counts the others. */
 int app_fail_config(const struct config_diagnostics *diagnostics);
 
-/* Loads the configuration that the first operand names, or in->links, with settings and scenario, and gives it to `work`. `work` may
- * change the configuration, which is freed afterwards. Returns the exit status. The reason of a failure is printed,
- * errors of a configuration as by app_fail_config. */
+/* Loads the configuration that the first operand names, or in->links, with settings and scenario, and gives it to
+ * `work`. `work` may change the configuration, which is freed afterwards. Returns the exit status. The reason of a
+ * failure is printed, errors of a configuration as by app_fail_config. */
 int app_with_config(const struct app_input *in, int (*work)(struct config *cfg, void *ctx, struct sh_err *err),
                     void *ctx);
 /* Takes the results of two pieces of work: `rc` of the first, whose reason is in err, and `more` of the second, whose

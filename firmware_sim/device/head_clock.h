@@ -76,9 +76,8 @@ int64_t head_clock_ns(const struct head_clock *clock, int64_t t_ns);
 void head_clock_change(struct head_clock *clock, int64_t t_ns, const struct head_clock_change *change);
 
 /* Adds a leap second that no table has, at the end of the UTC minute at a device time: that of the head's clock, or of
- * the true time, whichever is later. So it is ahead of both, and neither goes back. Where that minute has one already, it
- * comes at the end of the next. *posix_s: the second after it, since 1970. 0: the
- * table is full. */
+ * the true time, whichever is later. So it is ahead of both, and neither goes back. Where that minute has one already,
+ * it comes at the end of the next. *posix_s: the second after it, since 1970. 0: the table is full. */
 int head_clock_add_leap(struct head_clock *clock, int64_t t_ns, int64_t *posix_s);
 
 /* Finds a full second of the head's clock that begins in [from_ns, to_ns) of device time, an interval of at most a

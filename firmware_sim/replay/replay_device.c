@@ -10,7 +10,8 @@
 
 /* ---- which device it can be */
 
-/* All three are 0 where no place is configured (drivers/protocol/ANCHOR.md). A latitude of 0 alone is on the equator. */
+/* All three are 0 where no place is configured (drivers/protocol/ANCHOR.md). A latitude of 0 alone is on the equator.
+ * */
 static int stands_on_earth(const struct native_anchor *a)
 {
     return (a->moving & NATIVE_MOVING) == 0 && (a->lat_deg != 0.0 || a->lon_deg != 0.0 || a->height_m != 0.0);

@@ -92,13 +92,15 @@ static void parts_are_added(void **state)
     struct recording_result sum = a_result(), more = a_result();
     (void)state;
     more.points = 100; /* so that a doubled sum does not pass */
-    sum.counts.unknown = 3;
+    sum.counts.unknown = sum.unplaced = 3;
     more.counts.unknown = 40;
+    more.unplaced = 4;
     strcpy(more.missing, "the scan");
     recording_add(&sum, &more);
     assert_true(sum.points == 101 && sum.empty == 4 && sum.frames == 6 && sum.with_reflectance == 8);
     assert_true(sum.counts.scans == 10 && sum.counts.pulses == 12000 && sum.counts.fired == 14);
     assert_true(sum.counts.cast == 16 && sum.counts.lost == 18 && sum.counts.left_out == 20);
+    assert_int_equal(sum.unplaced, 7);
     assert_true(sum.counts.unknown == 43 && sum.counts.missing == 22 && sum.crowded == 24 && sum.faint == 26 &&
                 sum.unfit == 28);
     assert_true(sum.lost_samples == 30 && sum.replugs == 52 && sum.broken_scans == 54 && sum.bus_resets == 56);

@@ -30,8 +30,9 @@ struct offline {
  * error. cfg, beside: for offline_load, where there is no site. */
 int offline_open(struct config *cfg, const struct site *beside, double scan_s, const struct sh_report *report,
                  struct offline *offline, struct sh_err *err);
-/* Loads a site for heads that are powered up one after the other. cfg is changed (pace, links) and must live on. beside:
- * a site to share a scene with, as for site_load_for, where cfg is another scanner of its configuration; NULL: none. */
+/* Loads a site for heads that are powered up one after the other. cfg is changed (pace, links) and must live on.
+ * beside: a site to share a scene with, as for site_load_for, where cfg is another scanner of its configuration; NULL:
+ * none. */
 int offline_load(struct config *cfg, const struct site *beside, const struct sh_report *report, struct site **site,
                  struct sh_err *err);
 /* Ends the head, and frees its threads and its site. The caller's site stays. The client's handle

@@ -10,7 +10,8 @@
 #include "firmware_sim/base/clock.h"
 
 /* MOST_BYTES is half of what the library keeps, since the head's own queues come on top. PATIENCE_NS is longer than a
- * client waits for a reply (ask.c). A client that stands still for longer may wait for device time, which must go on. */
+ * client waits for a reply (ask.c). A client that stands still for longer may wait for device time, which must go on.
+ * */
 enum { MOST_FRAMES = SOAK_RING / 4, MOST_BYTES = 32 << 20 };
 static const int64_t PATIENCE_NS = 6000000000, STEP_NS = 1000000;
 

@@ -303,7 +303,7 @@ static void add_refused(struct soak_link *link, const struct scanhead_notice *no
     link->refused_frames++;
     if (!link->begun) return;
     struct soak_fact *fact = touch(link, soak_seq_of(link->soak, notice->seq));
-    if (fact != NULL && fact->got == 0) fact->gap = 1;
+    if (fact != NULL && fact->got == 0) fact->marks |= SOAK_GAP;
 }
 
 void soak_saw_notice(void *ctx, const struct scanhead_notice *notice)

@@ -13,9 +13,10 @@ struct soak_link;
 
 enum { SOAK_MAX_RUNS = 1024, SOAK_MAX_ACTS = 64 };
 
-/* A frame of a link. */
-/* It is missing; there was no session then; it went into one datagram with others. */
+/* Marks of a frame: it is missing; there was no session then; it went into one datagram with others. */
 enum { SOAK_GAP = 1, SOAK_AWAY = 2, SOAK_MERGED = 4 };
+
+/* A frame of a link. */
 struct soak_fact {
     soak_seq seq;
     int there;
