@@ -14,6 +14,7 @@ import {Input, KEYS} from './view_input.js';
 import {Overlay} from './view_overlay.js';
 import {Programs} from './view_gl.js';
 import {listenTo} from './view_events.js';
+import {readTheme} from './view_theme.js';
 
 // The picture is drawn again once the drawn points that are gone from the cloud exceed this share of its capacity.
 const GONE_SHARE = 0.04;
@@ -83,7 +84,7 @@ export class View extends EventTarget {
       },
       resized: () => this.#frames.ask('resize'),
       themed: () => {
-        this.colours = null;
+        this.colours = readTheme(this.canvas); // a frame that waits for the GPU is still put onto the page
         this.#frames.ask('restart');
       },
     });
@@ -93,6 +94,7 @@ export class View extends EventTarget {
   #attach() {
     const gl = this.#gl;
     this.programs = new Programs(gl);
+    this.colours ??= readTheme(this.canvas);
     this.#frames.attach();
     this.#points = new Points(gl, this.programs, this.cloud);
     this.#paint();
