@@ -1,17 +1,66 @@
 /* SPDX-License-Identifier: MIT */
 // These tests take the fields of the page as their user does, key by key, and compare what stands in a field with what
 // the head says. They also switch the theme while the picture moves, and look at the page after a replay's end.
-import {end, endpoint, start} from './head.mjs';
+import {Client, end, endpoint, start} from './head.mjs';
 import {CONFIG} from './rig.mjs';
 import {equal, test} from './work.mjs';
 
 const SIZE = [600, 480];
+const LINES = '#knob-head-lines';
+const valueOf = (selector) => `document.querySelector("${selector}").value`;
+
+/** Replaces the text of the field that has the focus, and presses Enter. */
+async function retype(page, text) {
+  await page.eval('document.activeElement.select()');
+  await page.send('Input.insertText', {text});
+  await page.key('Enter');
+}
 
 /** Runs all of them in a browser. */
 export async function testFields(browser) {
   const head = await start(['run', CONFIG, '--quiet', '--pace', 'fast']);
+  const other = new Client(endpoint(head, 'tcp'));
   const page = await browser.open(endpoint(head, 'web'), {size: SIZE});
-  await page.until('scanhead.head.isOpen && scanhead.head.state === "idle"');
+  await page.until(`scanhead.head.isOpen && scanhead.head.state === "idle" && ${valueOf(LINES)}`);
+  await page.press('#control');
+  await page.until(`scanhead.head.mine && !document.querySelector("${LINES}").disabled`);
+  const lines = (wanted) => other.until('HEAD:LIN?', (reply) => reply === wanted);
+  const hasText = (text, selector = LINES) => page.until(`${valueOf(selector)} === ${JSON.stringify(text)}`);
+
+  await test('arrow keys change a setting: on Enter, and when the field is left; Escape takes them back', async () => {
+    equal(await other.ask('HEAD:LIN?'), '100', 'lines a second at first');
+    await page.click(LINES);
+    for (const key of ['ArrowUp', 'ArrowUp']) await page.key(key);
+    await page.key('Enter');
+    await lines('102');
+    await page.key('ArrowDown');
+    await page.key('Tab');
+    await lines('101');
+    await page.click(LINES);
+    await page.key('ArrowUp');
+    await page.key('Escape');
+    equal(await page.eval(valueOf(LINES)), '101', 'the field after Escape');
+    await page.key('Tab');
+    equal(await other.ask('HEAD:LIN?'), '101', 'lines a second after Escape');
+  });
+
+  await test('a setting is set there and back in one field, which then has the value that the head says', async () => {
+    await page.click(LINES);
+    for (const value of ['60', '101', '60']) {
+      await retype(page, value);
+      await lines(value);
+    }
+    await retype(page, ' 61 ');
+    await hasText('61');
+    await retype(page, 'MIN');
+    await hasText(await other.until('HEAD:LIN?', (reply) => reply !== '61'));
+    await retype(page, '1e2');
+    await hasText('100');
+    await retype(page, '1e9');
+    await page.until(`document.querySelector("${LINES}").getAttribute("aria-invalid")`);
+    await hasText('100');
+    equal(await other.ask('HEAD:LIN?'), '100', 'lines a second after a refusal');
+  });
 
   await test('the theme may be switched while the picture moves', async () => {
     // A frame waits for the GPU in most of these turns. So a page that lost its colours then fails in one of them.

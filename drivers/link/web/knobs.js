@@ -157,12 +157,14 @@ export class Knobs extends EventTarget {
 
   #makeKnob(setting, name, says) {
     const id = `knob-${setting.header.replaceAll(':', '-').toLowerCase()}`;
-    const knob = {setting, value: '', shown: '', says}; // shown is its value, with few digits
+    const knob = {setting, value: '', shown: '', says}; // shown is the last text that came from the head, or was sent
     const attributes = {id, name: setting.header, 'aria-describedby': `${id}-hint ${says.id}`, autocomplete: 'off'};
     const isChoice = setting.kind === 'word' || setting.values.length > 0;
     knob.field = isChoice ? make('select', attributes) : make('input', {...attributes, type: 'text', inputmode: 'decimal', spellcheck: 'false'});
-    knob.field.addEventListener('change', () => this.#set(knob));
+    // A browser tells no `change` of a text that the arrow keys have set.
+    for (const type of ['change', 'blur']) knob.field.addEventListener(type, () => this.#set(knob));
     knob.field.addEventListener('keydown', (event) => {
+      if (event.key === 'Enter') this.#set(knob);
       if (event.key === 'Escape') this.#showValue(knob, knob.value);
       if (event.key === 'ArrowUp' || event.key === 'ArrowDown') this.#nudge(knob, event);
     });
@@ -206,11 +208,16 @@ export class Knobs extends EventTarget {
     knob.field.title = knob.shown === value || option ? '' : value; // it has all figures
   }
 
+  // While the user types, the text stays. Escape brings the present value.
+  #take(knob, value) {
+    if (knob.field !== document.activeElement || knob.field.value === knob.shown) this.#showValue(knob, value);
+    else knob.value = value;
+  }
+
   async #read() {
     await Promise.all([...this.#knobs.values()].map(async (knob) => {
       const value = await this.#session.command(`${knob.setting.header}?`);
-      if (knob.field !== document.activeElement || knob.field.value === knob.shown) this.#showValue(knob, value);
-      else knob.value = value; // the user types: the text stays, Escape brings the present value
+      if (!('waiting' in knob.box.dataset)) this.#take(knob, value);
     }));
     this.dispatchEvent(new Event('values'));
   }
@@ -228,16 +235,17 @@ export class Knobs extends EventTarget {
   }
 
   async #set(knob) {
-    const value = knob.field.value.trim();
-    if (value === '' || value === knob.shown) return this.#showValue(knob, knob.value);
+    const text = knob.field.value;
+    if (text === knob.shown) return;
+    if (text.trim() === '') return this.#showValue(knob, knob.value);
+    knob.shown = text;
     knob.box.dataset.waiting = '';
     try {
-      const reply = await this.#session.command(`${knob.setting.header} ${value}`);
+      await this.#session.command(`${knob.setting.header} ${text.trim()}`);
       this.#refuse(knob, '');
-      knob.value = reply === 'OK' ? value : reply;
     } catch (error) {
       this.#refuse(knob, why(error));
-      this.#showValue(knob, knob.value);
+      this.#take(knob, knob.value);
     }
     delete knob.box.dataset.waiting;
     try {
