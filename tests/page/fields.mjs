@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 // These tests take the fields of the page as their user does, key by key, and compare what stands in a field with what
 // the head says. They also switch the theme while the picture moves, and look at the page after a replay's end.
-import {Client, end, endpoint, start} from './head.mjs';
-import {CONFIG} from './rig.mjs';
-import {equal, test} from './work.mjs';
+import {Client, end, endpoint, run, start} from './head.mjs';
+import {choose, CONFIG} from './rig.mjs';
+import {equal, folder, test} from './work.mjs';
 
 const SIZE = [600, 480];
 const LINES = '#knob-head-lines';
@@ -86,4 +86,28 @@ export async function testFields(browser) {
 
   await page.close();
   await end(head);
+  await testEndOfReplay(browser);
+}
+
+export async function testEndOfReplay(browser) {
+  await test('after the end of a replay the page has the state that the head says', async () => {
+    // `record` writes a scan and its end; the head that was recorded was not idle again by then.
+    const file = `${folder}/ends.shs`;
+    run('record', CONFIG, '-o', file, '--quiet', '--set', 'head.pan_stop_deg=30');
+    const links = ['--link', 'type: web, waits: yes', '--link', 'type: tcp, port: 0'];
+    const replay = await start(['run', file, '--quiet', ...links]);
+    const other = new Client(endpoint(replay, 'tcp'));
+    const page = await browser.open(endpoint(replay, 'web'), {size: SIZE});
+    await page.until('!document.querySelector("#timeline").hidden && !document.querySelector("#play").disabled');
+    await choose(page, '#speed', '10');
+    await page.press('#play');
+    await page.until('scanhead.cloud.total > 0');
+    await other.until('SCAN:REPL?', (reply) => reply.startsWith('IDLE'));
+    await other.until('HEAD:STAT?', (reply) => reply === 'idle');
+    const hasWord = 'document.querySelector("#state-word").textContent === "Idle"';
+    await page.until(`${hasWord} && !document.querySelector("#start").disabled`);
+    equal(page.faults.join('\n'), '', 'errors of its scripts');
+    await page.close();
+    await end(replay);
+  });
 }
