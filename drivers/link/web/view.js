@@ -4,7 +4,7 @@
 
 import {Camera, radians} from './view_camera.js';
 import {MODES} from './view_colours.js';
-import {Scale, boxOf} from './view_limits.js';
+import {Scale, boxAround, boxOf} from './view_limits.js';
 import {Frames} from './view_frames.js';
 import {Points} from './view_parts.js';
 import {Solids} from './view_scene.js';
@@ -203,9 +203,8 @@ export class View extends EventTarget {
     this.cameraMoved();
   }
 
-  // Returns {min, max} around the stations and the scene. Without a scene the points take its place; of more than 500
-  // points the far ends are left out. null: there is nothing, not even a station.
-  bounds() { return boxOf(this.cloud, this.stations.list, this.#solids, true); }
+  // Returns {min, max} around all points, the stations and the scene. null: there is nothing, not even a station.
+  bounds() { return boxAround(this.cloud, this.stations.list, this.#solids); }
 
   fit() {
     const box = boxOf(this.cloud, this.stations.list, this.#solids);

@@ -4,6 +4,7 @@
 // A point has one number, which the shader turns into a colour: `ramp` by a table of 256 colours between the limits,
 // `list` by a table of colours by number, `rgb` as it is. An unknown value is GREY, not the end of a ramp.
 
+import {spreadOver} from './cloud.js';
 import {parse, rampAt} from './view_ramps.js';
 
 export {rampAt};
@@ -84,12 +85,8 @@ export function sampleOf(cloud, mode, most = 20000) {
   const each = Math.max(16, Math.floor(most / Math.max(1, cloud.blocks.length)));
   const all = [];
   for (const block of cloud.blocks) {
-    const n = Math.min(block.n, each);
-    if (block.closed) all.push(...valuesOf(block, mode, 0, n));
-    else for (let i = 0; i < n; i++) {
-      const at = Math.floor(i * block.n / n);
-      all.push(valuesOf(block, mode, at, at + 1)[0]);
-    }
+    if (block.closed) all.push(...valuesOf(block, mode, 0, Math.min(block.n, each)));
+    else for (const i of spreadOver(block, each)) all.push(valuesOf(block, mode, i, i + 1)[0]);
   }
   return all.filter((v) => v !== NONE && v === v);
 }
