@@ -2,7 +2,7 @@
 // The page's panels without a browser: contrast of its colours, a head's description of its settings, events in words,
 // the files of a recording. Expected values are by hand.
 import {readFileSync} from 'node:fs';
-import {duration, metres, grouped, numberOf, short} from '../../drivers/link/web/page.js';
+import {duration, fixed, metres, grouped, numberOf, placeText, short} from '../../drivers/link/web/page.js';
 import {describeSettings, splitReply} from '../../drivers/link/web/describe.js';
 import {limit, shortened} from '../../drivers/link/web/knobs.js';
 import {ptpText} from '../../drivers/link/web/figures.js';
@@ -88,6 +88,8 @@ test('each button, field and picture of the page has a name', () => {
 test('figures in words', () => {
   equal([grouped(1234567), grouped(-0.4), grouped(-1234.5, 1), grouped(NaN), grouped(12n)],
     ['1\u2009234\u2009567', '0', '−1\u2009234.5', '–', '12']);
+  equal([fixed(-0.0004, 3), fixed(-0.0005001, 3), fixed(12.345, 1), fixed(-0, 0)], ['0.000', '−0.001', '12.3', '0']);
+  equal([short(-0.001), short(-0.5), placeText({x_m: -0.004, y_m: -1, z_m: 0})], ['0.00', '−0.50', '0.00  −1.00  0.00']);
   equal([short(999), short(1000), short(1234567, 'B'), short(0.1234)], ['999', '1.00\u00a0k', '1.23\u00a0MB', '0.12']);
   equal([metres(0), metres(-0.0000031), metres(0.00483), metres(12.5)], ['0 mm', '−3\u00a0µm', '4.83\u00a0mm', '12.5\u00a0m']);
   equal([metres(3e-7), metres(-1e-9)], ['0.30\u00a0µm', '<\u20090.01\u00a0µm']);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // This panel has a field for each of the head's settings, with the limits, the unit and the refusals that the head
 // gives.
-import {bodyOf, byId, make, markField, say, atMostEvery} from './page.js';
+import {bodyOf, byId, fixed, make, markField, say, atMostEvery} from './page.js';
 import {describeSettings} from './describe.js';
 import {why} from './session.js';
 
@@ -263,7 +263,7 @@ export class Knobs extends EventTarget {
     event.preventDefault();
     const decimals = (knob.field.value.split('.')[1] ?? '').length;
     const by = 10 ** -decimals * (event.shiftKey ? 10 : 1) * (event.key === 'ArrowUp' ? 1 : -1);
-    knob.field.value = (number + by).toFixed(decimals);
+    knob.field.value = fixed(number + by, decimals).replace('−', '-');
   }
 
   async #reset() {
@@ -286,9 +286,9 @@ export class Knobs extends EventTarget {
     this.reset.title = 'Sends *RST: all settings as at power-up. A scan is stopped.';
     for (const knob of this.#knobs.values()) {
       const not = this.#session.whyNot(knob.setting.states);
-      const fixed = isFixed(knob.setting) && knob.field.tagName !== 'SELECT';
+      const isOne = isFixed(knob.setting) && knob.field.tagName !== 'SELECT';
       knob.field.disabled = common !== '' || not !== '';
-      knob.field.readOnly = fixed;
+      knob.field.readOnly = isOne;
       knob.box.title = not && !common ? `${knob.setting.header}: ${not}` : knob.setting.header;
     }
   }

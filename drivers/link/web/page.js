@@ -54,13 +54,18 @@ export function atMostEvery(ms, call) {
 export const NONE = '–';
 const known = (value) => typeof value === 'number' && Number.isFinite(value);
 
+// Writes a number with so many digits after the point. What is rounded to 0 has no sign.
+export function fixed(value, digits) {
+  const text = Math.abs(value).toFixed(digits);
+  return value < 0 && Number(text) !== 0 ? `−${text}` : text;
+}
+
 // Turns 1234567 into '1 234 567' with thin spaces; `digits` digits stand after the point.
 export function grouped(value, digits = 0) {
   if (typeof value === 'bigint') value = Number(value);
   if (!known(value)) return NONE;
-  const [whole, part] = Math.abs(value).toFixed(digits).split('.');
-  const text = whole.replace(/\B(?=(\d{3})+$)/g, '\u2009') + (part ? `.${part}` : '');
-  return Number(text.replace(/\u2009/g, '')) !== 0 && value < 0 ? `−${text}` : text;
+  const [whole, part] = fixed(value, digits).split('.');
+  return whole.replace(/\B(?=(\d{3})+$)/g, '\u2009') + (part ? `.${part}` : '');
 }
 
 // Turns 1234567 into '1.23 M': three digits and a prefix, for rates and counts.
@@ -76,7 +81,7 @@ export function short(value, unit = '') {
 
 function three(value) {
   const size = Math.abs(value);
-  return value.toFixed(size < 9.995 ? 2 : size < 99.95 ? 1 : 0);
+  return fixed(value, size < 9.995 ? 2 : size < 99.95 ? 1 : 0);
 }
 
 // Writes metres for people: micrometres up to metres.
@@ -92,7 +97,7 @@ export function metres(value) {
 }
 
 // Writes the place of a station for people, to a centimetre.
-export const placeText = ({x_m, y_m, z_m}) => [x_m, y_m, z_m].map((v) => v.toFixed(2)).join('  ').replaceAll('-', '−');
+export const placeText = ({x_m, y_m, z_m}) => [x_m, y_m, z_m].map((v) => fixed(v, 2)).join('  ');
 
 // Writes seconds for people: nanoseconds up to minutes.
 export function duration(value_s) {
