@@ -2,7 +2,7 @@
 // The page's panels without a browser: contrast of its colours, a head's description of its settings, events in words,
 // the files of a recording. Expected values are by hand.
 import {readFileSync} from 'node:fs';
-import {duration, fixed, metres, grouped, numberOf, placeText, short} from '../../drivers/link/web/page.js';
+import {asSent, duration, fixed, metres, grouped, numberOf, placeText, short} from '../../drivers/link/web/page.js';
 import {describeSettings, splitReply} from '../../drivers/link/web/describe.js';
 import {limit, shortened} from '../../drivers/link/web/knobs.js';
 import {ptpText} from '../../drivers/link/web/figures.js';
@@ -335,7 +335,9 @@ test('a trial that has ended asks no more for what the head has not worked out y
 });
 
 test('a number that a user has written: an empty text is none', () => {
-  equal(['', ' ', '−1,5', ' 2.5 ', 'x'].map(numberOf).map((v) => (Number.isNaN(v) ? null : v)), [null, null, -1.5, 2.5, null]);
+  equal(['', ' ', '−1,5', ' 2.5 ', 'x', '1e-3', '+.5', '2.'].map(numberOf).map((v) => (Number.isNaN(v) ? null : v)), [null, null, -1.5, 2.5, null, 0.001, 0.5, 2]);
+  equal(['0x10', '0b1', '1e400', 'Infinity', '1 2', '1,2,3', '1_0', '.', '--1'].filter((text) => !Number.isNaN(numberOf(text))), []);
+  equal(['−1,5', ' 61 ', '60 Hz', 'MIN', '1,2,3', '0x10', ''].map(asSent), ['-1.5', '61', '60 Hz', 'MIN', '1,2,3', '0x10', '']);
 });
 
 test('previews: damage is refused in words', () => {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // This panel has a field for each of the head's settings, with the limits, the unit and the refusals that the head
 // gives.
-import {bodyOf, byId, fixed, make, markField, say, atMostEvery} from './page.js';
+import {asSent, bodyOf, byId, fixed, make, markField, numberOf, say, atMostEvery} from './page.js';
 import {describeSettings} from './describe.js';
 import {why} from './session.js';
 
@@ -241,7 +241,7 @@ export class Knobs extends EventTarget {
     knob.shown = text;
     knob.box.dataset.waiting = '';
     try {
-      await this.#session.command(`${knob.setting.header} ${text.trim()}`);
+      await this.#session.command(`${knob.setting.header} ${asSent(text)}`);
       this.#refuse(knob, '');
     } catch (error) {
       this.#refuse(knob, why(error));
@@ -258,10 +258,10 @@ export class Knobs extends EventTarget {
   // the value.
   #nudge(knob, event) {
     if (knob.field.tagName === 'SELECT' || knob.field.readOnly) return;
-    const number = Number(knob.field.value);
-    if (!Number.isFinite(number) || knob.field.value.trim() === '') return;
+    const number = numberOf(knob.field.value);
+    if (Number.isNaN(number)) return;
     event.preventDefault();
-    const decimals = (knob.field.value.split('.')[1] ?? '').length;
+    const decimals = (asSent(knob.field.value).split('.')[1] ?? '').length;
     const by = 10 ** -decimals * (event.shiftKey ? 10 : 1) * (event.key === 'ArrowUp' ? 1 : -1);
     knob.field.value = fixed(number + by, decimals).replace('−', '-');
   }

@@ -35,8 +35,17 @@ export function markField(field, isRight) {
   else field.setAttribute('aria-invalid', 'true'); // an empty value would mark it as valid
 }
 
-// Returns the number that a user has written, NaN for none: an empty text is not 0.
-export const numberOf = (text) => (text.trim() === '' ? NaN : Number(text.trim().replace('−', '-').replace(',', '.')));
+// Returns the number that a user has written, NaN for none: an empty text is not 0. The sign may be the page's own, and
+// the point a comma. All numbers are decimal and finite.
+export function numberOf(text) {
+  const plain = plainOf(text);
+  return /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i.test(plain) && Number.isFinite(Number(plain)) ? Number(plain) : NaN;
+}
+
+const plainOf = (text) => text.trim().replaceAll('−', '-').replace(',', '.');
+
+// Returns a field's text as the head takes it: a number with the sign - and a point. Other texts stay.
+export const asSent = (text) => (Number.isNaN(numberOf(text)) ? text.trim() : plainOf(text));
 
 // Returns a function that runs call() at most once in every `ms`, and once more after its last use in that time.
 export function atMostEvery(ms, call) {
