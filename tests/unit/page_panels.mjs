@@ -5,6 +5,7 @@ import {readFileSync} from 'node:fs';
 import {asSent, duration, fixed, metres, grouped, numberOf, placeText, short} from '../../drivers/link/web/page.js';
 import {describeSettings, splitReply} from '../../drivers/link/web/describe.js';
 import {limit, shortened} from '../../drivers/link/web/knobs.js';
+import {limitText, limitsOf} from '../../drivers/link/web/limits.js';
 import {ptpText} from '../../drivers/link/web/figures.js';
 import {fetchSaved, savedWords} from '../../drivers/link/web/save.js';
 import {eventWords} from '../../drivers/link/web/log.js';
@@ -338,6 +339,14 @@ test('a number that a user has written: an empty text is none', () => {
   equal(['', ' ', '−1,5', ' 2.5 ', 'x', '1e-3', '+.5', '2.'].map(numberOf).map((v) => (Number.isNaN(v) ? null : v)), [null, null, -1.5, 2.5, null, 0.001, 0.5, 2]);
   equal(['0x10', '0b1', '1e400', 'Infinity', '1 2', '1,2,3', '1_0', '.', '--1'].filter((text) => !Number.isNaN(numberOf(text))), []);
   equal(['−1,5', ' 61 ', '60 Hz', 'MIN', '1,2,3', '0x10', ''].map(asSent), ['-1.5', '61', '60 Hz', 'MIN', '1,2,3', '0x10', '']);
+});
+
+test('limits by hand: their first texts, and what the fields have', () => {
+  const texts = (from, to) => [limitText(from, to - from), limitText(to, to - from)];
+  equal([texts(0.006123, 0.014), texts(-1.234567, 3.1), texts(9.999999999999999e29, 2e30), texts(0, 1000), texts(100000.0001, 100000.0002)],
+    [['0.00612', '0.014'], ['-1.23', '3.1'], ['1e+30', '2e+30'], ['0', '1000'], ['100000.0001', '100000.0002']]);
+  equal([limitsOf('', ' '), limitsOf('−1', '2,5')], [{limits: null, words: ''}, {limits: [-1, 2.5], words: ''}]);
+  equal([['', '1'], ['1', ''], ['2', '1'], ['1', '1'], ['0', '1e400'], ['0', 'x']].filter((two) => limitsOf(...two).words === ''), []);
 });
 
 test('previews: damage is refused in words', () => {
