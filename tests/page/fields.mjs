@@ -3,7 +3,7 @@
 // the head says. They also switch the theme while the picture moves, and look at the page after a replay's end.
 import {Client, end, endpoint, run, start} from './head.mjs';
 import {choose, CONFIG} from './rig.mjs';
-import {equal, folder, test} from './work.mjs';
+import {equal, folder, is, test} from './work.mjs';
 
 const SIZE = [600, 480];
 const LINES = '#knob-head-lines';
@@ -87,6 +87,36 @@ export async function testFields(browser) {
   await page.close();
   await end(head);
   await testEndOfReplay(browser);
+  await testDensity(browser);
+}
+
+export async function testDensity(browser) {
+  await test('a density that is refused is marked and said, and the points stay', async () => {
+    const file = `${folder}/dense.shs`;
+    run('record', CONFIG, '-o', file, '--quiet', '--set', 'head.pan_stop_deg=30');
+    const view = await start(['view', file]);
+    const page = await browser.open(view.ready.endpoints[0].endpoint, {size: SIZE});
+    const loaded = 'document.querySelector("#loaded")';
+    const isMarked = 'document.querySelector("#density").hasAttribute("aria-invalid")';
+    await page.until('scanhead.recording && scanhead.cloud.total > 0');
+    await page.click('#what-sparse');
+    const count = `Number(/^([\\d\u2009]+) of \\1 points$/.exec(${loaded}.textContent)[1].replaceAll('\u2009', ''))`;
+    const first = await page.until(`${loaded}.className === 'note' && scanhead.cloud.total === ${count} && ${count}`);
+    for (const text of ['abc', '', '0', '1e9']) {
+      await choose(page, '#density', text);
+      const words = await page.until(`${loaded}.className === 'refusal' && ${loaded}.textContent`);
+      is(/^Density: .*allowed .*\d/.test(words), `it says what is allowed: ${words}`);
+      equal(await page.eval(`[${isMarked}, scanhead.cloud.total].join()`), `true,${first}`, `"${text}": marked, points`);
+      await choose(page, '#density', '100');
+      await page.until(`${loaded}.className === 'note' && !${isMarked}`);
+    }
+    await choose(page, '#density', '50,0'); // half as many a square metre are half as many, rounded for each part
+    const half = await page.until(`scanhead.cloud.total !== ${first} && scanhead.cloud.total === ${count} && ${count}`);
+    is(Math.abs(half / first - 0.5) < 0.01, `${half} of ${first} points`);
+    equal(page.faults.filter((text) => !/400/.test(text)).join('\n'), '', 'errors of its scripts');
+    await page.close();
+    await end(view);
+  });
 }
 
 export async function testEndOfReplay(browser) {
