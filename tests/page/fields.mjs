@@ -120,18 +120,23 @@ export async function testDensity(browser) {
 }
 
 export async function testEndOfReplay(browser) {
-  await test('after the end of a replay the page has the state that the head says', async () => {
+  await test('a replay: each scan is done at its end, and then the page has the state that the head says', async () => {
     // `record` writes a scan and its end; the head that was recorded was not idle again by then.
     const file = `${folder}/ends.shs`;
-    run('record', CONFIG, '-o', file, '--quiet', '--set', 'head.pan_stop_deg=30');
+    run('record', CONFIG, '-o', file, '--quiet', '--station', 'all', '--set', 'head.pan_stop_deg=30');
     const links = ['--link', 'type: web, waits: yes', '--link', 'type: tcp, port: 0'];
     const replay = await start(['run', file, '--quiet', ...links]);
     const other = new Client(endpoint(replay, 'tcp'));
     const page = await browser.open(endpoint(replay, 'web'), {size: SIZE});
     await page.until('!document.querySelector("#timeline").hidden && !document.querySelector("#play").disabled');
-    await choose(page, '#speed', '10');
+    await page.eval(`void new MutationObserver((all) => { // all texts, also those of one task
+      for (const {addedNodes} of all) texts.push(...[...addedNodes].map((node) => node.textContent));
+    }).observe(document.querySelector('#progress'), {childList: true}, window.texts = [])`);
+    await choose(page, '#speed', '1');
     await page.press('#play');
-    await page.until('scanhead.cloud.total > 0');
+    await page.until('texts.includes("Scan 2: done")');
+    equal(await page.eval('texts.filter((text) => text.includes("ended after")).join()'), '', 'scans that were not whole');
+    is(await page.eval('texts.includes("Scan 1: done")'), 'the first scan is done, too');
     await other.until('SCAN:REPL?', (reply) => reply.startsWith('IDLE'));
     await other.until('HEAD:STAT?', (reply) => reply === 'idle');
     const hasWord = 'document.querySelector("#state-word").textContent === "Idle"';

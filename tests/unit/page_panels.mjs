@@ -5,6 +5,7 @@ import {readFileSync} from 'node:fs';
 import {asSent, duration, fixed, metres, grouped, numberOf, placeText, short} from '../../drivers/link/web/page.js';
 import {describeSettings, splitReply} from '../../drivers/link/web/describe.js';
 import {limit, shortened} from '../../drivers/link/web/knobs.js';
+import {Bar} from '../../drivers/link/web/bar.js';
 import {limitText, limitsOf} from '../../drivers/link/web/limits.js';
 import {ptpText} from '../../drivers/link/web/figures.js';
 import {fetchSaved, savedWords} from '../../drivers/link/web/save.js';
@@ -176,6 +177,17 @@ test('a head that no time was granted says what it waits for', () => {
   equal([words(), heard], ['Waits for time steps', 1]);
   session.head.dispatchEvent(new CustomEvent('state', {detail: {state: 'idle'}}));
   equal(words(), 'Idle');
+});
+
+test('progress follows the scan also where a replay goes back', () => {
+  const elements = {};
+  globalThis.document = {body: {dataset: {}}, getElementById: (id) => elements[id] ??= {dataset: {}, textContent: '', addEventListener() {}, setAttribute() {}}};
+  const session = Object.assign(new EventTarget(), {link: 'open', state: 'scanning', scan: 1});
+  const bar = new Bar(session, null);
+  const after = (act) => (act(), bar.show(), elements.progress.textContent.replace('\u00a0', ' '));
+  equal([() => bar.progress({frames: 2, frame_s: 4}), () => bar.reached(2), () => bar.progress({done: 1}), () => bar.reached(6), () => bar.reached(1), () => bar.begin()]
+    .map(after), ['Scan 1: frame 1 of 2', 'Scan 1: 25 %, frame 1 of 2', 'Scan 1: 25 %, frame 2 of 2', 'Scan 1: 75 %, frame 2 of 2',
+    'Scan 1: 12 %, frame 2 of 2', 'Scan 1: frame 1 of 2']);
 });
 
 test('the long-edge filter is a beginning of the sorted ratios', () => {
