@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 // These tests take the fields of the page as their user does, key by key, and compare what stands in a field with what
 // the head says. They also switch the theme while the picture moves, and look at the page after a replay's end.
+import {readFileSync} from 'node:fs';
 import {Client, end, endpoint, run, start} from './head.mjs';
 import {choose, CONFIG} from './rig.mjs';
-import {equal, folder, is, test} from './work.mjs';
+import {equal, folder, is, test, write} from './work.mjs';
 
 const SIZE = [600, 480];
 const LINES = '#knob-head-lines';
@@ -87,7 +88,24 @@ export async function testFields(browser) {
   await page.close();
   await end(head);
   await testEndOfReplay(browser);
+  await testNames(browser);
   await testDensity(browser);
+}
+
+// This head has more settings than the page has names for. The panel is as wide as on a large screen.
+export async function testNames(browser) {
+  await test('names of settings are not cut', async () => {
+    const beams = readFileSync(CONFIG, 'utf8').replace(/^head: .*$/m, 'head: {profile: velodyne-vlp16}');
+    const head = await start(['run', write('beams.yaml', beams), '--quiet', '--pace', 'fast']);
+    const page = await browser.open(endpoint(head, 'web'), {size: [1280, 700]});
+    await page.press('#control');
+    await page.until('document.querySelector("#knob-head-phase-lock")?.getClientRects().length');
+    const cut = await page.eval(`[...document.querySelectorAll('.knob label')]
+      .filter((e) => e.scrollWidth > e.clientWidth).map((e) => e.textContent).join()`);
+    equal(cut, '', 'names that are cut');
+    await page.close();
+    await end(head);
+  });
 }
 
 export async function testDensity(browser) {

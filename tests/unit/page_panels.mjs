@@ -13,7 +13,8 @@ import {eventWords} from '../../drivers/link/web/log.js';
 import {Session, stateWord} from '../../drivers/link/web/session.js';
 import {batchesOf, countWithin, fetchCloud, readMesh} from '../../drivers/link/web/recording_files.js';
 import {batchOf, countSeen, parseCells, parsePreview, parseReach, pathOf, seenWithin} from '../../drivers/link/web/previews.js';
-import {Cloud} from '../../drivers/link/web/cloud.js';
+import {NONE, sampleOf, valuesOf} from '../../drivers/link/web/view_colours.js';
+import {Cloud, pointOf} from '../../drivers/link/web/cloud.js';
 import {Trial} from '../../drivers/link/web/trial.js';
 import {cellAt, pairsOf, seenBy} from '../../drivers/link/web/trial_targets.js';
 import {Section} from '../../drivers/link/web/section.js';
@@ -219,6 +220,13 @@ test('a cloud in pieces, as batches of one station each', async () => {
   equal(asked, ['/cloud?every=1&first=0&count=200000', '/cloud?every=1&first=1&count=1']);
   equal(batches.map(({n, station, x, y, z, pulse, label}) => [n, station, x[0], y[0], z[0], pulse[0], label[0]]),
     [[1, 1, 100.5, 201.5, 298, 0, 65535], [1, 2, 100.5, 201.5, 298, 1, 65535]]);
+});
+
+test('points of a file without stations have none', () => {
+  const cloud = new Cloud();
+  for (const batch of batchesOf({n: 1, first: 0, every: 1, origin: [0, 0, 0], columns: {xyz: Float32Array.of(1, 2, 3)}})) cloud.add(batch);
+  const [block] = cloud.blocks;
+  equal([pointOf(cloud, block, 0).station, valuesOf(block, 'station', 0, 1)[0], sampleOf(cloud, 'station')], [undefined, NONE, []]);
 });
 
 test('a refusal of the link is an error with its words', async () => {

@@ -17,6 +17,7 @@ const GROUPS = [
   ['Noise', [['HEAD:NOISe', 'Of ranges'], ['HEAD:NOISe:SIGMa', 'One sigma'], ['HEAD:NOISe:BALL', 'Ball, its radius'],
     ['HEAD:NOISe:ANGLe', 'Of angles']]],
 ];
+const MORE = 'More';
 const NOTES = {'SCAN:FRAMes': '0: endless'};
 const ELSEWHERE = ['SITE:POSE']; // the stations' panel has it
 
@@ -128,7 +129,7 @@ export class Knobs extends EventTarget {
     const has = new Map(settings.filter((s) => s.states && !ELSEWHERE.includes(s.header)).map((s) => [s.header, s]));
     const known = new Set(GROUPS.flatMap(([, rows]) => rows.map(([header]) => header)));
     const more = [...has.keys()].filter((header) => !known.has(header)).map((header) => [header, header]);
-    const groups = [...GROUPS, ['More', more]];
+    const groups = [...GROUPS, [MORE, more]];
     const same = [...has.keys()].join() === [...this.#knobs.keys()].sort((a, b) =>
       [...has.keys()].indexOf(a) - [...has.keys()].indexOf(b)).join();
     if (same) {
@@ -150,7 +151,7 @@ export class Knobs extends EventTarget {
       const unit = common ? '' : unitName(has.get(header).unit);
       return this.#makeKnob(has.get(header), unit ? `${name}, ${unit}` : name, says);
     });
-    const columns = knobs.length % 3 === 0 || knobs.length > 4 ? 'three' : 'two';
+    const columns = title === MORE ? 'two headers' : knobs.length % 3 === 0 || knobs.length > 4 ? 'three' : 'two';
     return make('fieldset', {}, make('legend', {class: 'group'}, common ? `${title}, ${common}` : title),
       make('div', {class: `knobs ${columns}`}, ...knobs), says);
   }

@@ -36,7 +36,7 @@ export class Recording {
   #describe(r) {
     const body = bodyOf('recording');
     figureList(body, [['file', 'Format'], ['frame', 'Coordinates'], ['points', 'Points'], ['shots', 'Pulses without echo'],
-      ['left-out', 'Echoes left out', 'They could not be placed']])({
+      ['left-out', 'Echoes left out', 'Their place is not known, or too far away to be shown']])({
       'file': r.format, 'frame': FRAMES[r.frame] ?? r.frame, 'points': grouped(r.points),
       'shots': grouped(r.shots_without_echo), 'left-out': grouped(r.left_out),
     });
@@ -138,7 +138,7 @@ export class Recording {
 
   async #takeAll(path, options) {
     let done = 0;
-    const station = this.#info.stations?.[0]?.number ?? 1;
+    const station = this.#info.stations?.[0]?.number;
     await fetchCloud(path, {...options, take: (piece) => {
       if (options.signal.aborted) return;
       if (done === 0) this.#empty();

@@ -73,7 +73,7 @@ export function valuesOf(block, mode, from, to) {
   } else if (mode === 'height') for (let i = 0; i < n; i++) out[i] = block.position[3 * (from + i) + 2];
   else if (mode === 'label') for (let i = 0; i < n; i++) out[i] = block.label[from + i] === 0xffff ? NONE : block.label[from + i];
   else if (mode === 'echo') for (let i = 0; i < n; i++) out[i] = echoClass(block.echo[from + i]);
-  else if (mode === 'station') out.fill(block.station);
+  else if (mode === 'station') out.fill(block.station ?? NONE);
   else if (mode === 'age') for (let i = 0; i < n; i++) out[i] = block.first + (block.order ? block.order[from + i] : from + i);
   else if (numbers) for (let i = 0; i < n; i++) out[i] = Number.isNaN(numbers[from + i]) ? NONE : numbers[from + i];
   else out.fill(NONE);

@@ -119,7 +119,7 @@ export class Overlay {
     for (const {name, colour, right, up} of ends) {
       this.#line([[x, y], [x + r * right, y - r * up]], 2, colour);
       const away = Math.hypot(right, up) < 0.25 ? 0 : 11 / Math.hypot(right, up);
-      this.#text(name, x + r * right + away * right, y - r * up - away * up, {colour, bold: true});
+      this.#text(name, x + r * right + away * right, y - r * up - away * up, {colour, bold: true, inside: camera.width});
     }
   }
 
