@@ -37,6 +37,7 @@ export async function testFields(browser) {
     await page.key('ArrowDown');
     await page.key('Tab');
     await lines('101');
+    await page.until('!document.querySelector(".knob[data-waiting]")'); // the page has the head's answer, too
     await page.click(LINES);
     await page.key('ArrowUp');
     await page.key('Escape');

@@ -244,6 +244,7 @@ export class Knobs extends EventTarget {
     try {
       await this.#session.command(`${knob.setting.header} ${asSent(text)}`);
       this.#refuse(knob, '');
+      knob.value = asSent(text); // until the head says it, for Escape
     } catch (error) {
       this.#refuse(knob, why(error));
       this.#take(knob, knob.value);
