@@ -6,6 +6,7 @@ import {connect} from 'node:net';
 import {readFileSync} from 'node:fs';
 import {Browser} from './browser.mjs';
 import {Client, end, endpoint, start} from './head.mjs';
+import {testFields} from './fields.mjs';
 import {testInstrument} from './instrument.mjs';
 import {both, CONFIG, placesToDrag, recorded} from './rig.mjs';
 import {testTools} from './tools.mjs';
@@ -248,6 +249,7 @@ await test('a recording: its page has as many points', async () => {
   await end(view);
 });
 
+await testFields(browser);
 await testInstrument(browser);
 
 await browser.end();

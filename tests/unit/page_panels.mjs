@@ -2,16 +2,19 @@
 // The page's panels without a browser: contrast of its colours, a head's description of its settings, events in words,
 // the files of a recording. Expected values are by hand.
 import {readFileSync} from 'node:fs';
-import {duration, metres, grouped, numberOf, short} from '../../drivers/link/web/page.js';
+import {asSent, duration, fixed, metres, grouped, numberOf, placeText, short} from '../../drivers/link/web/page.js';
 import {describeSettings, splitReply} from '../../drivers/link/web/describe.js';
 import {limit, shortened} from '../../drivers/link/web/knobs.js';
+import {Bar} from '../../drivers/link/web/bar.js';
+import {limitText, limitsOf} from '../../drivers/link/web/limits.js';
 import {ptpText} from '../../drivers/link/web/figures.js';
 import {fetchSaved, savedWords} from '../../drivers/link/web/save.js';
 import {eventWords} from '../../drivers/link/web/log.js';
 import {Session, stateWord} from '../../drivers/link/web/session.js';
 import {batchesOf, countWithin, fetchCloud, readMesh} from '../../drivers/link/web/recording_files.js';
 import {batchOf, countSeen, parseCells, parsePreview, parseReach, pathOf, seenWithin} from '../../drivers/link/web/previews.js';
-import {Cloud} from '../../drivers/link/web/cloud.js';
+import {NONE, sampleOf, valuesOf} from '../../drivers/link/web/view_colours.js';
+import {Cloud, pointOf} from '../../drivers/link/web/cloud.js';
 import {Trial} from '../../drivers/link/web/trial.js';
 import {cellAt, pairsOf, seenBy} from '../../drivers/link/web/trial_targets.js';
 import {Section} from '../../drivers/link/web/section.js';
@@ -88,6 +91,8 @@ test('each button, field and picture of the page has a name', () => {
 test('figures in words', () => {
   equal([grouped(1234567), grouped(-0.4), grouped(-1234.5, 1), grouped(NaN), grouped(12n)],
     ['1\u2009234\u2009567', '0', '−1\u2009234.5', '–', '12']);
+  equal([fixed(-0.0004, 3), fixed(-0.0005001, 3), fixed(12.345, 1), fixed(-0, 0)], ['0.000', '−0.001', '12.3', '0']);
+  equal([short(-0.001), short(-0.5), placeText({x_m: -0.004, y_m: -1, z_m: 0})], ['0.00', '−0.50', '0.00  −1.00  0.00']);
   equal([short(999), short(1000), short(1234567, 'B'), short(0.1234)], ['999', '1.00\u00a0k', '1.23\u00a0MB', '0.12']);
   equal([metres(0), metres(-0.0000031), metres(0.00483), metres(12.5)], ['0 mm', '−3\u00a0µm', '4.83\u00a0mm', '12.5\u00a0m']);
   equal([metres(3e-7), metres(-1e-9)], ['0.30\u00a0µm', '<\u20090.01\u00a0µm']);
@@ -175,6 +180,17 @@ test('a head that no time was granted says what it waits for', () => {
   equal(words(), 'Idle');
 });
 
+test('progress follows the scan also where a replay goes back', () => {
+  const elements = {};
+  globalThis.document = {body: {dataset: {}}, getElementById: (id) => elements[id] ??= {dataset: {}, textContent: '', addEventListener() {}, setAttribute() {}}};
+  const session = Object.assign(new EventTarget(), {link: 'open', state: 'scanning', scan: 1});
+  const bar = new Bar(session, null);
+  const after = (act) => (act(), bar.show(), elements.progress.textContent.replace('\u00a0', ' '));
+  equal([() => bar.progress({frames: 2, frame_s: 4}), () => bar.reached(2), () => bar.progress({done: 1}), () => bar.reached(6), () => bar.reached(1), () => bar.begin()]
+    .map(after), ['Scan 1: frame 1 of 2', 'Scan 1: 25 %, frame 1 of 2', 'Scan 1: 25 %, frame 2 of 2', 'Scan 1: 75 %, frame 2 of 2',
+    'Scan 1: 12 %, frame 2 of 2', 'Scan 1: frame 1 of 2']);
+});
+
 test('the long-edge filter is a beginning of the sorted ratios', () => {
   const ratio = Float32Array.of(0.5, 1, 1, 2.2, 7);
   equal([0, 0.4, 1, 2.2, 6, 100].map((factor) => countWithin(ratio, factor)), [5, 0, 3, 4, 4, 5]);
@@ -204,6 +220,13 @@ test('a cloud in pieces, as batches of one station each', async () => {
   equal(asked, ['/cloud?every=1&first=0&count=200000', '/cloud?every=1&first=1&count=1']);
   equal(batches.map(({n, station, x, y, z, pulse, label}) => [n, station, x[0], y[0], z[0], pulse[0], label[0]]),
     [[1, 1, 100.5, 201.5, 298, 0, 65535], [1, 2, 100.5, 201.5, 298, 1, 65535]]);
+});
+
+test('points of a file without stations have none', () => {
+  const cloud = new Cloud();
+  for (const batch of batchesOf({n: 1, first: 0, every: 1, origin: [0, 0, 0], columns: {xyz: Float32Array.of(1, 2, 3)}})) cloud.add(batch);
+  const [block] = cloud.blocks;
+  equal([pointOf(cloud, block, 0).station, valuesOf(block, 'station', 0, 1)[0], sampleOf(cloud, 'station')], [undefined, NONE, []]);
 });
 
 test('a refusal of the link is an error with its words', async () => {
@@ -333,7 +356,17 @@ test('a trial that has ended asks no more for what the head has not worked out y
 });
 
 test('a number that a user has written: an empty text is none', () => {
-  equal(['', ' ', '−1,5', ' 2.5 ', 'x'].map(numberOf).map((v) => (Number.isNaN(v) ? null : v)), [null, null, -1.5, 2.5, null]);
+  equal(['', ' ', '−1,5', ' 2.5 ', 'x', '1e-3', '+.5', '2.'].map(numberOf).map((v) => (Number.isNaN(v) ? null : v)), [null, null, -1.5, 2.5, null, 0.001, 0.5, 2]);
+  equal(['0x10', '0b1', '1e400', 'Infinity', '1 2', '1,2,3', '1_0', '.', '--1'].filter((text) => !Number.isNaN(numberOf(text))), []);
+  equal(['−1,5', ' 61 ', '60 Hz', 'MIN', '1,2,3', '0x10', ''].map(asSent), ['-1.5', '61', '60 Hz', 'MIN', '1,2,3', '0x10', '']);
+});
+
+test('limits by hand: their first texts, and what the fields have', () => {
+  const texts = (from, to) => [limitText(from, to - from), limitText(to, to - from)];
+  equal([texts(0.006123, 0.014), texts(-1.234567, 3.1), texts(9.999999999999999e29, 2e30), texts(0, 1000), texts(100000.0001, 100000.0002)],
+    [['0.00612', '0.014'], ['-1.23', '3.1'], ['1e+30', '2e+30'], ['0', '1000'], ['100000.0001', '100000.0002']]);
+  equal([limitsOf('', ' '), limitsOf('−1', '2,5')], [{limits: null, words: ''}, {limits: [-1, 2.5], words: ''}]);
+  equal([['', '1'], ['1', ''], ['2', '1'], ['1', '1'], ['0', '1e400'], ['0', 'x']].filter((two) => limitsOf(...two).words === ''), []);
 });
 
 test('previews: damage is refused in words', () => {

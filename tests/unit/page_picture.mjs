@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 // This file tests the pure parts of the page's picture (drivers/link/web): the stored points and their order, the
 // camera, colours and limits, picking, dragging, levels of detail, the scene's bytes. It prints TAP on standard output.
+import {isWithin, Section} from '../../drivers/link/web/section.js';
+import {boxAround, boxOf} from '../../drivers/link/web/view_limits.js';
 import {Cloud, BLOCK, evenOrder, nearestTo, pointOf} from '../../drivers/link/web/cloud.js';
 import {FAR_M, NEAR_M, arrowStep, depthOf, headingTo, onPlane, radians, roundBelow, split} from '../../drivers/link/web/view_camera.js';
 import {NONE, legendOf, rampAt, robustLimits, sampleOf, ticks, valuesOf, widened} from '../../drivers/link/web/view_colours.js';
@@ -172,6 +174,36 @@ test('limits: robust, and the same while points come unless they miss much', () 
   near(high, 2.005, 1e-6, 'its other end');
   same(widened([0, 10], [-0.5, 10.9]), [0, 10], 'within a tenth');
   same(widened([0, 10], [3, 15]), [0, 15], 'more');
+});
+
+// 16 beams fire in turn, at heights of 0 to 3 m, while their head turns about (0, 0, 0).
+const BEAMS = (n) => batch(n, (i) => [5 * Math.cos(i / 999), 5 * Math.sin(i / 999), 0.2 * (i % 16)]);
+
+test('a sample of an open block has all beams, whatever the number of points', () => {
+  for (const n of [1003, 16_000, 20_000, 28_939, 48_000]) {
+    const cloud = new Cloud();
+    cloud.add(BEAMS(n));
+    same(new Set(sampleOf(cloud, 'height', 1000)).size, 16, `heights of ${n} points`);
+  }
+});
+
+test('all points are in the box of a section; a view of everything leaves out stray ones alone', () => {
+  const no = {bounds: () => null};
+  const boxes = (n, place) => {
+    const cloud = new Cloud();
+    const all = BEAMS(20_000);
+    for (let i = 0; i < n; i++) [all.x[i], all.y[i], all.z[i]] = place(i);
+    cloud.add(all);
+    return [boxAround(cloud, [], no), boxOf(cloud, [], no)];
+  };
+  // Without the 1 % the box is 10 m x 10 m x 3 m, with a diagonal of 14.5 m. So a mast of 15 m is no stray point.
+  for (const box of boxes(120, (i) => [0, 0, (i + 1) / 8])) near(box.max[2], 15, 1e-6, 'a mast of 120 points');
+  const [all, view] = boxes(5, (i) => [0, 0, -100 - i]);
+  near(all.min[2], -104, 1e-6, 'five points below the ground are in the box of a section');
+  near(view.min[2], 0, 0.1, 'and not in the view'); // the limits are 2 % of the height wider
+  const section = Section.around(all, 'box').relativeTo([0, 0, 0]);
+  same([-104, 3].map((z) => isWithin(section, 0, 0, z)), [true, true], 'the section around them');
+  near(boxOf({count: 600, bounds: null, blocks: []}, [{x_m: 1, y_m: 2, z_m: 3}], no).max[0], 6, 0, 'no point has a place');
 });
 
 test('colours: ends of a ramp, NaN, ticks, legend', () => {

@@ -287,6 +287,7 @@ test('how far apart points are: a grid, also where its scans are two, and none',
 test('figures are rounded by their errors', () => {
   same([0.0021, 0.0014, 0.02, 1.2, 30, NaN].map(decimalsOf), [3, 4, 2, 1, 0, 3], 'decimals');
   const text = (value, error, unit = 'm') => figureText(unit, {value, error}).replaceAll('\u00a0', ' ');
+  same([text(-0.0001, NaN), text(-0.0004, 0.002)], ['0.000 m', '0.000 m ± 2 mm'], 'what is rounded to 0 has no sign');
   same(text(2.10432, 0.0021), '2.104 m ± 2 mm');
   same(text(2.10432, 0.00141), '2.1043 m ± 1.4 mm');
   same(text(-2.10432, 0.023), '−2.10 m ± 20 mm'); // as many figures as its error

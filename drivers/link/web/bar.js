@@ -33,10 +33,16 @@ export class Bar {
   // Takes the frames of the scan, the number of frames done, and the time of one frame (0: not known).
   progress({frames = this.#frames, done = this.#done, frame_s = this.#frame_s}) {
     if (frames === this.#frames && done === this.#done && frame_s === this.#frame_s) return;
-    if (frames !== this.#frames || frame_s !== this.#frame_s || done < this.#done) this.#share = null;
     this.#frames = frames;
     this.#done = done;
     this.#frame_s = frame_s;
+    this.show();
+  }
+
+  // A scan has begun, perhaps a second time in a replay.
+  begin() {
+    this.#share = null;
+    this.#done = 0;
     this.show();
   }
 
@@ -44,7 +50,7 @@ export class Bar {
   reached(t_s) {
     if (!(this.#frames > 0 && this.#frame_s > 0 && t_s >= 0)) return;
     const share = Math.min(0.99, t_s / (this.#frame_s * this.#frames), (this.#done + 1) / this.#frames);
-    if (this.#share !== null && share <= this.#share) return;
+    if (share === this.#share) return;
     this.#share = share;
     this.#showSoon();
   }

@@ -32,8 +32,16 @@ export function evenOrder(n) {
   return n === BLOCK ? evenly : evenly.filter((i) => i < n);
 }
 
+// Returns the numbers of up to `most` points of a block, spread evenly over it, also while the block is filled.
+export function spreadOver({n, closed}, most) {
+  if (closed || n <= most) return Array.from({length: Math.min(n, most)}, (_, i) => i);
+  const order = evenOrder(BLOCK), out = [];
+  for (let k = 0; out.length < most; k++) if (order[k] < n) out.push(order[k]);
+  return out;
+}
+
 // This is the finalizer of MurmurHash3 (Appleby, public domain).
-function mix(h) {
+export function mix(h) {
   h = Math.imul(h ^ (h >>> 16), 0x85ebca6b);
   h = Math.imul(h ^ (h >>> 13), 0xc2b2ae35);
   return (h ^ (h >>> 16)) >>> 8;

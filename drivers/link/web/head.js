@@ -101,6 +101,11 @@ export class Head extends EventTarget {
     await this.#askControl();
   }
 
+  /** Asks for the state, which no frame may have told. */
+  async askState() {
+    this.#become(await this.command('HEAD:STATe?'));
+  }
+
   async #askControl() {
     this.#controlled(Number(await this.command('SYSTem:CONTrol?')));
   }

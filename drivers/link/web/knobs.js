@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // This panel has a field for each of the head's settings, with the limits, the unit and the refusals that the head
 // gives.
-import {bodyOf, byId, make, markField, say, atMostEvery} from './page.js';
+import {asSent, bodyOf, byId, fixed, make, markField, numberOf, say, atMostEvery} from './page.js';
 import {describeSettings} from './describe.js';
 import {why} from './session.js';
 
@@ -17,6 +17,7 @@ const GROUPS = [
   ['Noise', [['HEAD:NOISe', 'Of ranges'], ['HEAD:NOISe:SIGMa', 'One sigma'], ['HEAD:NOISe:BALL', 'Ball, its radius'],
     ['HEAD:NOISe:ANGLe', 'Of angles']]],
 ];
+const MORE = 'More';
 const NOTES = {'SCAN:FRAMes': '0: endless'};
 const ELSEWHERE = ['SITE:POSE']; // the stations' panel has it
 
@@ -128,7 +129,7 @@ export class Knobs extends EventTarget {
     const has = new Map(settings.filter((s) => s.states && !ELSEWHERE.includes(s.header)).map((s) => [s.header, s]));
     const known = new Set(GROUPS.flatMap(([, rows]) => rows.map(([header]) => header)));
     const more = [...has.keys()].filter((header) => !known.has(header)).map((header) => [header, header]);
-    const groups = [...GROUPS, ['More', more]];
+    const groups = [...GROUPS, [MORE, more]];
     const same = [...has.keys()].join() === [...this.#knobs.keys()].sort((a, b) =>
       [...has.keys()].indexOf(a) - [...has.keys()].indexOf(b)).join();
     if (same) {
@@ -150,19 +151,21 @@ export class Knobs extends EventTarget {
       const unit = common ? '' : unitName(has.get(header).unit);
       return this.#makeKnob(has.get(header), unit ? `${name}, ${unit}` : name, says);
     });
-    const columns = knobs.length % 3 === 0 || knobs.length > 4 ? 'three' : 'two';
+    const columns = title === MORE ? 'two headers' : knobs.length % 3 === 0 || knobs.length > 4 ? 'three' : 'two';
     return make('fieldset', {}, make('legend', {class: 'group'}, common ? `${title}, ${common}` : title),
       make('div', {class: `knobs ${columns}`}, ...knobs), says);
   }
 
   #makeKnob(setting, name, says) {
     const id = `knob-${setting.header.replaceAll(':', '-').toLowerCase()}`;
-    const knob = {setting, value: '', shown: '', says}; // shown is its value, with few digits
+    const knob = {setting, value: '', shown: '', says}; // shown is the last text that came from the head, or was sent
     const attributes = {id, name: setting.header, 'aria-describedby': `${id}-hint ${says.id}`, autocomplete: 'off'};
     const isChoice = setting.kind === 'word' || setting.values.length > 0;
     knob.field = isChoice ? make('select', attributes) : make('input', {...attributes, type: 'text', inputmode: 'decimal', spellcheck: 'false'});
-    knob.field.addEventListener('change', () => this.#set(knob));
+    // A browser tells no `change` of a text that the arrow keys have set.
+    for (const type of ['change', 'blur']) knob.field.addEventListener(type, () => this.#set(knob));
     knob.field.addEventListener('keydown', (event) => {
+      if (event.key === 'Enter') this.#set(knob);
       if (event.key === 'Escape') this.#showValue(knob, knob.value);
       if (event.key === 'ArrowUp' || event.key === 'ArrowDown') this.#nudge(knob, event);
     });
@@ -206,11 +209,16 @@ export class Knobs extends EventTarget {
     knob.field.title = knob.shown === value || option ? '' : value; // it has all figures
   }
 
+  // While the user types, the text stays. Escape brings the present value.
+  #take(knob, value) {
+    if (knob.field !== document.activeElement || knob.field.value === knob.shown) this.#showValue(knob, value);
+    else knob.value = value;
+  }
+
   async #read() {
     await Promise.all([...this.#knobs.values()].map(async (knob) => {
       const value = await this.#session.command(`${knob.setting.header}?`);
-      if (knob.field !== document.activeElement || knob.field.value === knob.shown) this.#showValue(knob, value);
-      else knob.value = value; // the user types: the text stays, Escape brings the present value
+      if (!('waiting' in knob.box.dataset)) this.#take(knob, value);
     }));
     this.dispatchEvent(new Event('values'));
   }
@@ -228,16 +236,18 @@ export class Knobs extends EventTarget {
   }
 
   async #set(knob) {
-    const value = knob.field.value.trim();
-    if (value === '' || value === knob.shown) return this.#showValue(knob, knob.value);
+    const text = knob.field.value;
+    if (text === knob.shown) return;
+    if (text.trim() === '') return this.#showValue(knob, knob.value);
+    knob.shown = text;
     knob.box.dataset.waiting = '';
     try {
-      const reply = await this.#session.command(`${knob.setting.header} ${value}`);
+      await this.#session.command(`${knob.setting.header} ${asSent(text)}`);
       this.#refuse(knob, '');
-      knob.value = reply === 'OK' ? value : reply;
+      knob.value = asSent(text); // until the head says it, for Escape
     } catch (error) {
       this.#refuse(knob, why(error));
-      this.#showValue(knob, knob.value);
+      this.#take(knob, knob.value);
     }
     delete knob.box.dataset.waiting;
     try {
@@ -250,12 +260,12 @@ export class Knobs extends EventTarget {
   // the value.
   #nudge(knob, event) {
     if (knob.field.tagName === 'SELECT' || knob.field.readOnly) return;
-    const number = Number(knob.field.value);
-    if (!Number.isFinite(number) || knob.field.value.trim() === '') return;
+    const number = numberOf(knob.field.value);
+    if (Number.isNaN(number)) return;
     event.preventDefault();
-    const decimals = (knob.field.value.split('.')[1] ?? '').length;
+    const decimals = (asSent(knob.field.value).split('.')[1] ?? '').length;
     const by = 10 ** -decimals * (event.shiftKey ? 10 : 1) * (event.key === 'ArrowUp' ? 1 : -1);
-    knob.field.value = (number + by).toFixed(decimals);
+    knob.field.value = fixed(number + by, decimals).replace('−', '-');
   }
 
   async #reset() {
@@ -278,9 +288,9 @@ export class Knobs extends EventTarget {
     this.reset.title = 'Sends *RST: all settings as at power-up. A scan is stopped.';
     for (const knob of this.#knobs.values()) {
       const not = this.#session.whyNot(knob.setting.states);
-      const fixed = isFixed(knob.setting) && knob.field.tagName !== 'SELECT';
+      const isOne = isFixed(knob.setting) && knob.field.tagName !== 'SELECT';
       knob.field.disabled = common !== '' || not !== '';
-      knob.field.readOnly = fixed;
+      knob.field.readOnly = isOne;
       knob.box.title = not && !common ? `${knob.setting.header}: ${not}` : knob.setting.header;
     }
   }

@@ -7,6 +7,20 @@ import {SCALES} from './view_ramps.js';
 
 const SHARES = [['0.01', '1 % to 99 %'], ['0.05', '5 % to 95 %'], ['0', 'All points'], ['hand', 'By hand']];
 
+// Writes a limit with as many digits as tell a hundredth of the limits' distance.
+export function limitText(value, distance) {
+  const digits = Math.floor(Math.log10(Math.abs(value))) - Math.floor(Math.log10(distance)) + 3;
+  return digits > 0 ? String(Number(value.toPrecision(Math.min(digits, 17)))) : '0';
+}
+
+// Returns the limits of two fields, {limits, words}. Two empty fields have none (null), and the page finds them. Where
+// the fields are wrong, words say why.
+export function limitsOf(...texts) {
+  if (texts.every((text) => text.trim() === '')) return {limits: null, words: ''};
+  const [low, high] = texts.map(numberOf);
+  return {limits: [low, high], words: low < high ? '' : 'Two numbers; the first has to be the lower one.'};
+}
+
 export class Limits {
   #view;
   #mode = '';
@@ -54,8 +68,7 @@ export class Limits {
   #chosen() {
     const p = this.#parts, legend = this.#view.legend();
     if (p.share.value === 'hand' && typeof legend?.from === 'number') {
-      p.low.value = legend.from.toFixed(2);
-      p.high.value = legend.to.toFixed(2);
+      for (const [field, value] of [[p.low, legend.from], [p.high, legend.to]]) field.value = limitText(value, legend.to - legend.from);
     }
     this.#apply();
     this.#keep();
@@ -74,14 +87,12 @@ export class Limits {
   // Returns whether the limits are valid.
   #apply() {
     const p = this.#parts, isByHand = p.share.value === 'hand' && this.#mode !== 'age';
-    const [low, high] = [numberOf(p.low.value), numberOf(p.high.value)], isRight = low < high;
+    const {limits, words} = isByHand ? limitsOf(p.low.value, p.high.value) : {limits: null, words: ''};
     p.hand.hidden = !isByHand;
-    const isBegun = p.low.value.trim() !== '' && p.high.value.trim() !== '';
-    say(p.says, !isByHand || isRight || !isBegun ? '' : 'Two numbers; the first has to be the lower one.');
-    for (const field of [p.low, p.high]) markField(field, p.says.textContent === '');
+    say(p.says, words);
+    for (const field of [p.low, p.high]) markField(field, words === '');
     if (!isByHand) this.#view.ramp({share: Number(p.share.value)});
-    if (!isByHand) this.#view.limits();
-    else if (isRight) this.#view.limits(low, high);
-    return isRight || !isByHand;
+    if (words === '') this.#view.limits(...limits ?? []);
+    return words === '';
   }
 }

@@ -22,6 +22,7 @@ import {RecordingPlayer, ReplayPlayer, Timeline} from './timeline.js';
 import {startTools} from './all_tools.js';
 
 const CAPACITY = 10e6; // so many points are stored
+const LAST_OF_FRAME = 1; // in the status of a line's end
 const WIDE = '(min-width: 47rem)';
 
 // The browser remembers which panels are open; at first a small screen has only a few.
@@ -143,10 +144,11 @@ function startHead(cloud, view, names, keepsPast) {
     bar.progress({done: detail.frame});
     if (detail.n > 0) bar.reached(detail.t[detail.n - 1]);
   });
+  head.addEventListener('line-end', ({detail}) => detail.status & LAST_OF_FRAME && bar.progress({done: detail.frame + 1}));
   head.addEventListener('descriptor', ({detail}) => bar.progress({frames: detail.frames, frame_s: frameSeconds(detail)}));
   head.addEventListener('event', ({detail}) => {
-    if (detail.name === 'SCAN_END') countFrames();
-    if (detail.name === 'SCAN_START') bar.progress({done: 0});
+    if (detail.name === 'SCAN_END' && !timeline) countFrames(); // a replay may be in its next scan already
+    if (detail.name === 'SCAN_START') bar.begin();
     if (detail.name === 'SITE') showPlan();
   });
   head.addEventListener('names', ({detail}) => names.add(detail));

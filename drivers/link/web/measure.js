@@ -9,6 +9,7 @@
 import {isOutside, isPointOutside} from './cloud.js';
 import {add, cross, dot, sub, unit} from './view_camera.js';
 import {headAxes} from './view_stations.js';
+import {fixed} from './page.js';
 import {isWithin} from './section.js';
 
 const STEP_M = 1e-4; // of the differences; figures are smooth over it
@@ -246,13 +247,11 @@ export function decimalsOf(error) {
   return Math.max(0, Math.min(6, (error / 10 ** power < 1.95 ? 1 : 0) - power));
 }
 
-const minus = (text) => text.replace('-', '−');
-
 // Returns a figure in words, rounded by its error: "2.104 m ± 2 mm", "90.02° ± 0.11°"; "2.104 m" without an error.
 export function figureText(unitName, {value, error}) {
   const isKnown = Number.isFinite(error), decimals = decimalsOf(isKnown ? error : unitName === '°' ? 0.05 : NaN);
   const gap = unitName === '°' ? '' : '\u00a0';
-  const own = `${minus(value.toFixed(decimals))}${gap}${unitName}`;
+  const own = `${fixed(value, decimals)}${gap}${unitName}`;
   if (!isKnown) return own;
   const small = unitName === 'm' && error < 0.9995;
   return `${own} ± ${small ? (1e3 * Number(error.toFixed(decimals))).toFixed(Math.max(0, decimals - 3)) : error.toFixed(decimals)}${gap}${small ? 'mm' : unitName}`;

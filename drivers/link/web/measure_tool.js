@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // This tool measures between points that are picked in the picture or the panorama. A click takes the point nearest to
 // it; with keys, Enter takes the point in the middle of the picture.
-import {grouped, make, numberOf, say} from './page.js';
+import {grouped, make, markField, numberOf, say} from './page.js';
 import {csvOf, figureText, flatnessOf, KINDS, largestOf, placeOf, pointsOnFace, spacingAround, withError} from './measure.js';
 import {download} from './picture.js';
 import {runSlowly} from './view_pick.js';
@@ -130,6 +130,7 @@ export class MeasureTool {
   #endOutline() {
     const depth_m = numberOf(this.#depth.value);
     if (this.#picked.length < 3) return say(this.#says, 'An outline has at least three corners.');
+    markField(this.#depth, depth_m > 0 && depth_m <= 10);
     if (!(depth_m > 0 && depth_m <= 10)) return say(this.#says, 'Refused: the depth is a number from above 0 to 10 m.');
     const corners = this.#picked.splice(0), {cloud, camera} = this.#view;
     say(this.#says, 'Looking through the points.');

@@ -41,8 +41,17 @@ export function markField(field, isRight) {
   else field.setAttribute('aria-invalid', 'true'); // an empty value would mark it as valid
 }
 
-// Returns the number that a user has written, NaN for none: an empty text is not 0.
-export const numberOf = (text) => (text.trim() === '' ? NaN : Number(text.trim().replace('−', '-').replace(',', '.')));
+// Returns the number that a user has written, NaN for none: an empty text is not 0. The sign may be the page's own, and
+// the point a comma. All numbers are decimal and finite.
+export function numberOf(text) {
+  const plain = plainOf(text);
+  return /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i.test(plain) && Number.isFinite(Number(plain)) ? Number(plain) : NaN;
+}
+
+const plainOf = (text) => text.trim().replaceAll('−', '-').replace(',', '.');
+
+// Returns a field's text as the head takes it: a number with the sign - and a point. Other texts stay.
+export const asSent = (text) => (Number.isNaN(numberOf(text)) ? text.trim() : plainOf(text));
 
 // Returns a function that runs call() at most once in every `ms`, and once more after its last use in that time.
 export function atMostEvery(ms, call) {
@@ -60,13 +69,18 @@ export function atMostEvery(ms, call) {
 export const NONE = '–';
 const known = (value) => typeof value === 'number' && Number.isFinite(value);
 
+// Writes a number with so many digits after the point. What is rounded to 0 has no sign.
+export function fixed(value, digits) {
+  const text = Math.abs(value).toFixed(digits);
+  return value < 0 && Number(text) !== 0 ? `−${text}` : text;
+}
+
 // Turns 1234567 into '1 234 567' with thin spaces; `digits` digits stand after the point.
 export function grouped(value, digits = 0) {
   if (typeof value === 'bigint') value = Number(value);
   if (!known(value)) return NONE;
-  const [whole, part] = Math.abs(value).toFixed(digits).split('.');
-  const text = whole.replace(/\B(?=(\d{3})+$)/g, '\u2009') + (part ? `.${part}` : '');
-  return Number(text.replace(/\u2009/g, '')) !== 0 && value < 0 ? `−${text}` : text;
+  const [whole, part] = fixed(value, digits).split('.');
+  return whole.replace(/\B(?=(\d{3})+$)/g, '\u2009') + (part ? `.${part}` : '');
 }
 
 // Turns 1234567 into '1.23 M': three digits and a prefix, for rates and counts.
@@ -82,7 +96,7 @@ export function short(value, unit = '') {
 
 function three(value) {
   const size = Math.abs(value);
-  return value.toFixed(size < 9.995 ? 2 : size < 99.95 ? 1 : 0);
+  return fixed(value, size < 9.995 ? 2 : size < 99.95 ? 1 : 0);
 }
 
 // Writes metres for people: micrometres up to metres.
@@ -98,7 +112,7 @@ export function metres(value) {
 }
 
 // Writes the place of a station for people, to a centimetre.
-export const placeText = ({x_m, y_m, z_m}) => [x_m, y_m, z_m].map((v) => v.toFixed(2)).join('  ').replaceAll('-', '−');
+export const placeText = ({x_m, y_m, z_m}) => [x_m, y_m, z_m].map((v) => fixed(v, 2)).join('  ');
 
 // Writes seconds for people: nanoseconds up to minutes.
 export function duration(value_s) {

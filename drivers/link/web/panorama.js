@@ -2,7 +2,7 @@
 // A panorama shows the points of one station as its head sees them. Azimuth goes from the head's forward direction to
 // the right, elevation upward. Each pixel has its nearest point. The module is pure.
 
-import {isOutside, isPointOutside} from './cloud.js';
+import {isOutside, isPointOutside, mix} from './cloud.js';
 import {isWithin} from './section.js';
 import {dot, sub} from './view_camera.js';
 import {headAxes} from './view_stations.js';
@@ -175,7 +175,7 @@ export class Panorama {
     }
     const isList = mode === 'label';
     const every = Math.ceil(n / SAMPLED);
-    const limits = isList ? null : robustLimits(values.filter((v, p) => p % every === 0 && v === v && v !== NONE));
+    const limits = isList ? null : robustLimits(values.filter((v, p) => mix(p) % every === 0 && v === v && v !== NONE));
     const table = tableOf(mode), pixels = new Uint8ClampedArray(4 * n);
     for (let p = 0; p < n; p++) {
       const v = values[p];

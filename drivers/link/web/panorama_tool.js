@@ -2,7 +2,7 @@
 // This tool shows the panorama of a station under the picture, by range, intensity or surface. Pointing at it shows the
 // point in the picture. Pointing at the picture shows the point in the panorama. A click turns the picture to the
 // point, or picks it while something is measured.
-import {atMostEvery, byId, make, say, short} from './page.js';
+import {atMostEvery, byId, fixed, make, say, short} from './page.js';
 import {MODES} from './view_colours.js';
 import {Panorama} from './panorama.js';
 import {runSlowly} from './view_pick.js';
@@ -203,7 +203,7 @@ export class PanoramaTool {
     if (panorama === null) return;
     if (point === null) return say(this.#says, 'Point at the panorama to see the point in the picture, or at the picture to see the point here.');
     const [azimuth, elevation, range] = panorama.anglesOf([point.x, point.y, point.z]);
-    const deg = (rad) => `${(DEG * rad).toFixed(2).replace('-', '−')}°`;
+    const deg = (rad) => `${fixed(DEG * rad, 2)}°`;
     const surface = point.label === 0xffff ? '' : this.#names('label', point.label) ?? '';
     say(this.#says, [`Azimuth ${deg(azimuth)}, elevation ${deg(elevation)}, ${range.toFixed(3)}\u00a0m`, surface].filter(Boolean).join(' · '));
   });

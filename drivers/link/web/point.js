@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 // This panel shows the figures of the point under the pointer. The panel lies over the picture, and only while there is
 // a point, so that nothing else moves.
-import {byId, grouped, make, metres, say, NONE} from './page.js';
+import {byId, fixed, grouped, make, metres, say, NONE} from './page.js';
 
 const CELLS = [['place', 'x, y, z', 'wide'], ['deviation', 'Deviation'], ['range', 'Range'], ['reflectance', 'Reflectance'],
   ['amplitude', 'Amplitude'], ['echo', 'Echo'], ['surface', 'Surface', 'wide'], ['station', 'Station'], ['time', 'Time'],
   ['pulse', 'Pulse'], ['rgb', 'Colour']];
 
-const fixed = (value, digits, unit) => (Number.isFinite(value) ? `${value.toFixed(digits).replace('-', '−')}\u00a0${unit}` : NONE);
+const withUnit = (value, digits, unit) => (Number.isFinite(value) ? `${fixed(value, digits)}\u00a0${unit}` : NONE);
 
 export class Point {
   #cells = {};
@@ -58,13 +58,13 @@ export class Point {
 
   #texts(p) {
     return {
-      place: Number.isFinite(p.x) ? `${[p.x, p.y, p.z].map((v) => fixed(v, 3, '')).join(' ')} m` : NONE,
-      deviation: metres(p.deviation_m), range: fixed(p.range, 3, 'm'),
-      reflectance: fixed(p.reflectance, 1, 'dB'), amplitude: fixed(p.amplitude, 1, 'dB'),
+      place: Number.isFinite(p.x) ? `${[p.x, p.y, p.z].map((v) => fixed(v, 3)).join(' ')}\u00a0m` : NONE,
+      deviation: metres(p.deviation_m), range: withUnit(p.range, 3, 'm'),
+      reflectance: withUnit(p.reflectance, 1, 'dB'), amplitude: withUnit(p.amplitude, 1, 'dB'),
       echo: p.echo ? `${p.echo} of ${p.echoes}` : NONE,
       surface: p.label === undefined || p.label === 0xffff ? NONE : this.#names('label', p.label) ?? String(p.label),
       station: p.station === undefined ? NONE : this.#names('station', p.station) ?? String(p.station),
-      time: fixed(p.t + this.t0_s, 3, 's'),
+      time: withUnit(p.t + this.t0_s, 3, 's'),
       pulse: p.pulse === undefined ? NONE : grouped(p.pulse),
       rgb: p.rgb?.length === 3 ? Array.from(p.rgb).join(' ') : NONE,
     };

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // This module shows a recording, without a head: its points, the mesh of a scan, or points spread evenly over that
 // mesh.
-import {atMostEvery, bodyOf, byId, figureList, grouped, make, metres, say, short} from './page.js';
+import {asSent, atMostEvery, bodyOf, byId, figureList, grouped, make, markField, metres, say, short} from './page.js';
 import {batchesOf, countWithin, fetchCloud, fetchMesh} from './recording_files.js';
 
 const MOST_POINTS = 10e6;
@@ -36,7 +36,7 @@ export class Recording {
   #describe(r) {
     const body = bodyOf('recording');
     figureList(body, [['file', 'Format'], ['frame', 'Coordinates'], ['points', 'Points'], ['shots', 'Pulses without echo'],
-      ['left-out', 'Echoes left out', 'They could not be placed']])({
+      ['left-out', 'Echoes left out', 'Their place is not known, or too far away to be shown']])({
       'file': r.format, 'frame': FRAMES[r.frame] ?? r.frame, 'points': grouped(r.points),
       'shots': grouped(r.shots_without_echo), 'left-out': grouped(r.left_out),
     });
@@ -59,7 +59,7 @@ export class Recording {
     p.edge = make('input', {id: 'long-edge', type: 'range', min: 0, max: SLIDER_OFF, step: 1, value: sliderOf(10), input: () => this.#edge(),
       change: () => this.#what === 'sparse' && this.load()});
     p.edgeText = make('output', {for: 'long-edge', class: 'unit'});
-    p.density = make('input', {id: 'density', type: 'text', inputmode: 'decimal', value: '100', change: () => this.load()});
+    p.density = make('input', {id: 'density', type: 'text', inputmode: 'decimal', value: '100', 'aria-describedby': 'loaded', change: () => this.load()});
     p.says = make('p', {class: 'note', id: 'loaded'}); // it shows how much is loaded
     p.done = make('p', {class: 'unseen', role: 'status'}); // a screen reader reads only the result
     p.bar = make('div');
@@ -111,9 +111,7 @@ export class Recording {
   async load() {
     this.#abort?.abort();
     const {signal} = (this.#abort = new AbortController());
-    this.#cloud.clear();
-    this.#mesh = null;
-    this.#show();
+    markField(this.#parts.density, true);
     try {
       if (this.#what === 'mesh') await this.#loadMesh(signal);
       else if (this.#what === 'sparse') await this.#loadSparse(signal);
@@ -123,23 +121,34 @@ export class Recording {
       say(this.#parts.done, this.#parts.says.textContent);
     } catch (error) {
       if (signal.aborted) return;
+      const words = error.message.replace(/^per_m2=[^:]*/, 'Density');
+      markField(this.#parts.density, words === error.message);
       this.#parts.says.className = 'refusal';
-      say(this.#parts.says, error.message);
-      say(this.#parts.done, error.message);
+      say(this.#parts.says, words);
+      say(this.#parts.done, words);
     }
+  }
+
+  // What is shown stays until something else has come: a request may be refused.
+  #empty() {
+    this.#cloud.clear();
+    this.#mesh = null;
+    this.#show();
   }
 
   async #takeAll(path, options) {
     let done = 0;
-    const station = this.#info.stations?.[0]?.number ?? 1;
+    const station = this.#info.stations?.[0]?.number;
     await fetchCloud(path, {...options, take: (piece) => {
       if (options.signal.aborted) return;
+      if (done === 0) this.#empty();
       for (const batch of batchesOf(piece, station)) this.#cloud.add(batch);
       if (done === 0) this.#view?.fit();
       done += piece.n;
       const all = Math.ceil(piece.total / piece.every);
       this.#progress(done, all, `${grouped(done)} of ${grouped(all)} points${piece.every > 1 ? `: one in ${piece.every}` : ''}`);
     }});
+    if (done === 0 && !options.signal.aborted) this.#empty();
   }
 
   async #loadPoints(signal) {
@@ -149,7 +158,7 @@ export class Recording {
 
   async #loadSparse(signal) {
     const factor = factorOf(Number(this.#parts.edge.value)), {scan} = this.#scan();
-    const density = this.#parts.density.value.trim();
+    const density = asSent(this.#parts.density.value);
     this.#progress(0, 1, 'Points are spread over the mesh');
     await this.#takeAll(`/sparse?per_m2=${encodeURIComponent(density)}&long_edge=${factor}&scan=${scan}&`, {signal});
   }
@@ -157,6 +166,7 @@ export class Recording {
   async #loadMesh(signal) {
     const {scan, first_point: first, points} = this.#scan();
     const positions = new Float32Array(3 * points);
+    this.#empty();
     let at = 0, origin = [0, 0, 0];
     await fetchCloud('/cloud?every=1&', {first, end: first + points, signal, take: (piece) => {
       ({origin} = piece);

@@ -75,9 +75,10 @@ export function countWithin(ratio, factor) {
 
 const filled = (Kind, n, value) => new Kind(n).fill(value);
 
-// Returns a piece as batches for the Cloud: one for each run of points of one station. Pulses are not known; the
-// number of the point in the file is used instead.
-export function batchesOf(piece, station = 1) {
+// Returns a piece as batches for the Cloud: one for each run of points of one station. Where the piece has no stations,
+// all points have the given one, or none (undefined). Pulses are not known; the number of the point in the file is used
+// instead.
+export function batchesOf(piece, station) {
   const {n, origin, columns: c} = piece;
   const axis = (k) => Float64Array.from({length: n}, (_, i) => c.xyz[3 * i + k] + origin[k]);
   const all = {

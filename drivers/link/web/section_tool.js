@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 // This tool looks into a house, by a section box, or by a cut between two heights. The tool's handles are sliders on
 // the picture, for pointer, touch and keys. The section stays after the tool is left, until it is switched off.
-import {byId, make, numberField, numberOf, say} from './page.js';
+import {byId, fixed, make, numberField, numberOf, say} from './page.js';
 import {alongLine, Section} from './section.js';
 import {arrowStep, degrees, headingTo, onPlane, sub} from './view_camera.js';
 
@@ -13,7 +13,6 @@ const FIELDS = [['from', 'From height, m'], ['to', 'To height, m'], ['wide', 'Wi
   ['x', 'Middle x, m'], ['y', 'Middle y, m'], ['heading', 'Heading, °']];
 
 const shown = (value) => String(Math.round(value * 1e3) / 1e3);
-const minus = (value, digits) => value.toFixed(digits).replace('-', '−');
 
 export class SectionTool {
   id = 'section';
@@ -136,10 +135,10 @@ export class SectionTool {
 
   #valueOf(s, id) {
     if (id === 'turn') return [s.heading_deg, `${s.heading_deg.toFixed(0)} degrees`];
-    if (id === 'move') return [0, `x ${minus(s.middle[0], 2)}, y ${minus(s.middle[1], 2)} metres`];
+    if (id === 'move') return [0, `x ${fixed(s.middle[0], 2)}, y ${fixed(s.middle[1], 2)} metres`];
     if (id === 'top' || id === 'bottom') {
       const z = id === 'top' ? s.to_m : s.from_m;
-      return [z, `height ${minus(z, 2)} metres`];
+      return [z, `height ${fixed(z, 2)} metres`];
     }
     const size = 2 * s.half[id === 'right' || id === 'left' ? 0 : 1];
     return [size, `box of ${size.toFixed(2)} metres`];

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 // This panel shows the places of the stations. With control, and while the head is idle, they can be moved.
-import {bodyOf, fetchJson, make, numberField, placeText, say} from './page.js';
+import {asSent, bodyOf, fetchJson, make, numberField, placeText, say} from './page.js';
 import {why} from './session.js';
 
 export const PARTS = [['x_m', 'East x', 'm'], ['y_m', 'North y', 'm'], ['z_m', 'Height z', 'm'],
@@ -97,7 +97,7 @@ export class Stations extends EventTarget {
     const says = make('p', {class: 'note', role: 'status'}), time = make('p', {class: 'note'});
     const form = make('form', {submit: (event) => {
       event.preventDefault();
-      this.#send(number, [number, ...fields.map(({field}) => field.value.trim())].join(', '));
+      this.#send(number, [number, ...fields.map(({field}) => asSent(field.value))].join(', '));
     }}, make('div', {class: 'place-fields'}, ...fields.map(({box}) => box)), says, time,
     make('div', {class: 'actions'}, ...(this.#session ? [buttons.move, buttons.back, buttons.home, buttons.use] : []), buttons.look));
     const place = make('span', {class: 'place'});

@@ -197,6 +197,8 @@ export class ReplayPlayer {
       return false;
     }
     this.#plays = state === 'PLAYING';
+    // A recording may end before its head is idle again, and no frame tells that the replay is at its end.
+    if (!this.#plays && this.#session.state !== 'idle') this.#session.head.askState().catch(() => {});
     Object.assign(this, {position_s: Number(position), length_s: Number(length), loop: loop === 'ON',
       isPlaying: this.#plays && Number(speed) > 0, speed: Number(speed) > 0 ? Number(speed) : this.#wanted});
     this.#wanted = this.speed;

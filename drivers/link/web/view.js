@@ -4,7 +4,7 @@
 
 import {Camera, radians} from './view_camera.js';
 import {MODES} from './view_colours.js';
-import {Scale, boxOf} from './view_limits.js';
+import {Scale, boxAround, boxOf} from './view_limits.js';
 import {Frames} from './view_frames.js';
 import {Points} from './view_parts.js';
 import {Solids} from './view_scene.js';
@@ -14,6 +14,7 @@ import {Input, KEYS} from './view_input.js';
 import {Overlay} from './view_overlay.js';
 import {Programs} from './view_gl.js';
 import {listenTo} from './view_events.js';
+import {readTheme} from './view_theme.js';
 
 // The picture is drawn again once the drawn points that are gone from the cloud exceed this share of its capacity.
 const GONE_SHARE = 0.04;
@@ -83,7 +84,7 @@ export class View extends EventTarget {
       },
       resized: () => this.#frames.ask('resize'),
       themed: () => {
-        this.colours = null;
+        this.colours = readTheme(this.canvas); // a frame that waits for the GPU is still put onto the page
         this.#frames.ask('restart');
       },
     });
@@ -93,6 +94,7 @@ export class View extends EventTarget {
   #attach() {
     const gl = this.#gl;
     this.programs = new Programs(gl);
+    this.colours ??= readTheme(this.canvas);
     this.#frames.attach();
     this.#points = new Points(gl, this.programs, this.cloud);
     this.#paint();
@@ -201,9 +203,8 @@ export class View extends EventTarget {
     this.cameraMoved();
   }
 
-  // Returns {min, max} around the stations and the scene. Without a scene the points take its place; of more than 500
-  // points the far ends are left out. null: there is nothing, not even a station.
-  bounds() { return boxOf(this.cloud, this.stations.list, this.#solids, true); }
+  // Returns {min, max} around all points, the stations and the scene. null: there is nothing, not even a station.
+  bounds() { return boxAround(this.cloud, this.stations.list, this.#solids); }
 
   fit() {
     const box = boxOf(this.cloud, this.stations.list, this.#solids);

@@ -4,6 +4,7 @@
 // A point has one number, which the shader turns into a colour: `ramp` by a table of 256 colours between the limits,
 // `list` by a table of colours by number, `rgb` as it is. An unknown value is GREY, not the end of a ramp.
 
+import {spreadOver} from './cloud.js';
 import {parse, rampAt} from './view_ramps.js';
 
 export {rampAt};
@@ -72,7 +73,7 @@ export function valuesOf(block, mode, from, to) {
   } else if (mode === 'height') for (let i = 0; i < n; i++) out[i] = block.position[3 * (from + i) + 2];
   else if (mode === 'label') for (let i = 0; i < n; i++) out[i] = block.label[from + i] === 0xffff ? NONE : block.label[from + i];
   else if (mode === 'echo') for (let i = 0; i < n; i++) out[i] = echoClass(block.echo[from + i]);
-  else if (mode === 'station') out.fill(block.station);
+  else if (mode === 'station') out.fill(block.station ?? NONE);
   else if (mode === 'age') for (let i = 0; i < n; i++) out[i] = block.first + (block.order ? block.order[from + i] : from + i);
   else if (numbers) for (let i = 0; i < n; i++) out[i] = Number.isNaN(numbers[from + i]) ? NONE : numbers[from + i];
   else out.fill(NONE);
@@ -84,12 +85,8 @@ export function sampleOf(cloud, mode, most = 20000) {
   const each = Math.max(16, Math.floor(most / Math.max(1, cloud.blocks.length)));
   const all = [];
   for (const block of cloud.blocks) {
-    const n = Math.min(block.n, each);
-    if (block.closed) all.push(...valuesOf(block, mode, 0, n));
-    else for (let i = 0; i < n; i++) {
-      const at = Math.floor(i * block.n / n);
-      all.push(valuesOf(block, mode, at, at + 1)[0]);
-    }
+    if (block.closed) all.push(...valuesOf(block, mode, 0, Math.min(block.n, each)));
+    else for (const i of spreadOver(block, each)) all.push(valuesOf(block, mode, i, i + 1)[0]);
   }
   return all.filter((v) => v !== NONE && v === v);
 }

@@ -5,7 +5,6 @@
 import {Camera} from './view_camera.js';
 import {Painter, progress, shares} from './view_draw.js';
 import {drawShaded} from './view_gl.js';
-import {readTheme} from './view_theme.js';
 import {copyOf} from './picture.js';
 
 const REST_MS = 120; // after so long without a movement the view rests
@@ -62,7 +61,6 @@ export class Frames {
   // The page's ground is shown until there is a picture, since an empty canvas is black.
   bare() {
     const gl = this.#gl, view = this.#view;
-    view.colours ??= readTheme(view.canvas);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.clearColor(...view.colours.ground, 1);
     gl.clear(gl.COLOR_BUFFER_BIT);
@@ -96,7 +94,7 @@ export class Frames {
   }
 
   get state() {
-    const {drawn, left} = progress(this.#parts());
+    const {drawn, left} = progress(this.#contents.parts());
     return {drawn, left, moving: this.#moving, frames_per_s: this.#fps};
   }
 
@@ -126,17 +124,14 @@ export class Frames {
     const want = this.#want;
     if (want.resize) this.#resize();
     if (this.#size === null) return;
-    this.#view.colours ??= readTheme(this.#view.canvas);
     if (this.#contents.follow()) want.restart ??= 'later';
-    const parts = this.#parts();
+    const parts = this.#contents.parts();
     if (want.camera) this.#move(parts, now);
     else this.#rest(parts, now);
     if (want.overlay && !this.#made) this.#over();
     this.#tell(now);
     this.#next(parts);
   }
-
-  #parts() { return this.#view.colours ? this.#contents.parts() : []; }
 
   #move(parts, now) {
     const want = this.#want;
@@ -238,7 +233,7 @@ export class Frames {
   #tell(now, done = false) {
     if (now - this.#toldAt < (done ? 250 : 500)) return;
     this.#toldAt = now;
-    this.#view.dispatchEvent(new CustomEvent('drawn', {detail: {frames_per_s: this.#fps, points: progress(this.#parts()).drawn}}));
+    this.#view.dispatchEvent(new CustomEvent('drawn', {detail: {frames_per_s: this.#fps, points: progress(this.#contents.parts()).drawn}}));
   }
 
   #resize() {

@@ -3,6 +3,7 @@
 // limits change rarely, so that nothing flickers: when the cloud has twice the points, and then only if the new points
 // lie far outside. The limits of the mode age change sooner.
 
+import {spreadOver} from './cloud.js';
 import {MODES, legendOf, robustLimits, sampleOf, widened} from './view_colours.js';
 
 const AGED = 1.15; // in the mode age the limits follow sooner
@@ -82,30 +83,34 @@ export class Scale {
   }
 }
 
-// Returns {min, max} in the scene frame, without the far ends of the points, or null.
-function robustBox({blocks, origin}) {
+// Returns {min, max} in the scene frame, without stray points: a single one, far away, would make all others small. 1 %
+// of the points at an end is left out, where the last of them lies further out than the box without them is wide.
+function boxWithoutStray({blocks, bounds, origin}) {
   const axes = [[], [], []];
-  for (const block of blocks) {
-    const n = Math.min(block.n, 1000), step = block.closed ? 1 : Math.max(1, Math.floor(block.n / n));
-    for (let i = 0; i < n; i++) axes.forEach((v, a) => v.push(block.position[3 * step * i + a]));
-  }
+  for (const block of blocks) for (const i of spreadOver(block, 1000)) axes.forEach((v, a) => v.push(block.position[3 * i + a]));
   const limits = axes.map((v) => robustLimits(v.filter((c) => c === c)) ?? [0, 0]);
-  return {min: limits.map((l, a) => l[0] + origin[a]), max: limits.map((l, a) => l[1] + origin[a])};
+  const wide = Math.hypot(...limits.map(([lo, hi]) => hi - lo));
+  const side = (a, inner, outer) => (Math.abs(outer - inner) > wide ? inner : outer);
+  return {min: limits.map(([lo], a) => side(a, lo + origin[a], bounds.min[a])),
+    max: limits.map(([, hi], a) => side(a, hi + origin[a], bounds.max[a]))};
+}
+
+// Returns the box around boxes and the stations; null without any. A box may be null.
+function around(boxes, stations) {
+  const places = stations.map((s) => [s.x_m, s.y_m, s.z_m]);
+  const corners = [...boxes.filter(Boolean).flatMap(({min, max}) => [min, max]), ...places];
+  if (corners.length === 0) return null;
+  if (corners.length === places.length) corners.push(places[0].map((c) => c - 5), places[0].map((c) => c + 5));
+  const ends = (most) => [0, 1, 2].map((a) => corners.reduce((end, p) => most(end, p[a]), corners[0][a]));
+  return {min: ends(Math.min), max: ends(Math.max)};
 }
 
 // Returns the box of a view of everything: the points and the stations. As long as there are at most 500 points, the
 // scene takes the place of the points. With sceneFirst it always does.
 export function boxOf(cloud, stations, solids, sceneFirst = false) {
   const scene = sceneFirst || cloud.count <= 500 ? solids.bounds() : null;
-  const box = scene ?? (cloud.count > 500 ? robustBox(cloud) : cloud.bounds);
-  const places = stations.map((s) => [s.x_m, s.y_m, s.z_m]);
-  if (box === null && places.length === 0) return null;
-  const min = box?.min ?? places[0].map((c) => c - 5), max = box?.max ?? places[0].map((c) => c + 5);
-  for (const p of places) {
-    p.forEach((c, a) => {
-      min[a] = Math.min(min[a], c);
-      max[a] = Math.max(max[a], c);
-    });
-  }
-  return {min, max};
+  return around([scene ?? (cloud.count > 500 && cloud.bounds ? boxWithoutStray(cloud) : cloud.bounds)], stations);
 }
+
+// Returns the box with all points in it, the scene and the stations.
+export const boxAround = (cloud, stations, solids) => around([cloud.bounds, solids.bounds()], stations);

@@ -3,6 +3,7 @@
 // overlay is a 2D canvas over the picture, so that lines and letters are sharp; each has an edge in the ground's
 // colour.
 
+import {fixed} from './page.js';
 import {degrees, roundBelow} from './view_camera.js';
 import {inScene} from './view_stations.js';
 
@@ -104,7 +105,7 @@ export class Overlay {
 
   #looking(camera) {
     const deg = (rad) => (rad * 180 / Math.PI);
-    this.#text(`${degrees(camera.azimuth).toFixed(0)}° · ${deg(camera.elevation).toFixed(0).replace('-', '−')}° · field ${deg(camera.fov).toFixed(0)}°`, 16,
+    this.#text(`${degrees(camera.azimuth).toFixed(0)}° · ${fixed(deg(camera.elevation), 0)}° · field ${deg(camera.fov).toFixed(0)}°`, 16,
       camera.height - 18, {align: 'left'});
   }
 
@@ -118,7 +119,7 @@ export class Overlay {
     for (const {name, colour, right, up} of ends) {
       this.#line([[x, y], [x + r * right, y - r * up]], 2, colour);
       const away = Math.hypot(right, up) < 0.25 ? 0 : 11 / Math.hypot(right, up);
-      this.#text(name, x + r * right + away * right, y - r * up - away * up, {colour, bold: true});
+      this.#text(name, x + r * right + away * right, y - r * up - away * up, {colour, bold: true, inside: camera.width});
     }
   }
 
@@ -205,7 +206,7 @@ export class Overlay {
     const from = camera.project([station.x_m, station.y_m, station.z_m]);
     const d = [moved.x - station.x_m, moved.y - station.y_m, moved.z - station.z_m];
     if (from.w > 0 && Math.hypot(...d) > 1e-3) this.#line([[from.x, from.y], [head.x, head.y]], 1.5, this.colours.accent, [5, 5]);
-    const show = (v) => v.toFixed(2).replace('-', '−');
+    const show = (v) => fixed(v, 2);
     const turned = ((moved.heading_deg - station.heading_deg + 540) % 360) - 180;
     const lines = [`x ${show(moved.x)}  y ${show(moved.y)}  z ${show(moved.z)} m`, `${Math.hypot(...d).toFixed(2)} m from where it was`];
     if (Math.abs(turned) > 0.005) lines[1] = `heading ${moved.heading_deg.toFixed(1)}° (${turned > 0 ? '+' : '−'}${Math.abs(turned).toFixed(1)}°)`;

@@ -200,8 +200,10 @@ int viewed_load(struct viewed *v, const char *path, const struct sh_report *repo
     rc = strcmp(v->format, "shs") == 0 ? viewed_load_stream(v, report, err) : viewed_load_cloud(v, report, err);
     if (rc != SH_OK) return rc;
     if (v->n_left_out > 0)
-        sh_warn(report, "%s: %llu echoes left out, since their place is not known", path,
-                (unsigned long long)v->n_left_out);
+        sh_warn(
+            report,
+            "%s: %llu echoes left out, since their place is not known, or is beyond 1e12 m or a latitude of 90 degrees",
+            path, (unsigned long long)v->n_left_out);
     if (v->points.n == 0)
         return sh_fail(err, SH_EINPUT, "%s: it has no points, but %llu shots without echo", path,
                        (unsigned long long)v->n_empty);
