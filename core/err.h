@@ -38,8 +38,9 @@ int sh_fail(struct sh_err *err, int code, const char *fmt, ...) __attribute__((f
  * within a character. */
 void sh_keep_line(char *text);
 
-/* Receives the reports of long work. Each member may be NULL: `rest` then receives these reports, if there is one. warn
- * and progress are called from the thread that does the work. */
+/* Receives the reports of long work. Each member may be NULL: `rest` then receives these reports, if there is one. So a
+ * member that is set to NULL silences only a report without `rest`. warn and progress are called from the thread that
+ * does the work. */
 struct sh_report {
     void *ctx;
     void (*warn)(void *ctx, const char *text);                      /* one line, without a newline */

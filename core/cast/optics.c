@@ -126,7 +126,7 @@ void caster_follow(struct nearest *w, const struct cast_setup *s, const struct r
         for (uint32_t k = 0; k < p->n; k++) {
             if (!(p->length_m[k] + p->range_m[k] <= s->range_max_m)) continue;
             optics_keep(p, k);
-            if (caster_goes_on(s, p->label[k])) set_out(s, p, on++, k);
+            if (depth + 1 < s->detect->depth && caster_goes_on(s, p->label[k])) set_out(s, p, on++, k);
         }
         p->n = on;
     }

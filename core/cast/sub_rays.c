@@ -12,8 +12,10 @@
 static void weigh_pool(struct caster *c, const struct cast_setup *s, uint32_t first)
 {
     struct pool *p = &c->sub_rays->pool;
+    struct beyond *b = &c->sub_rays->beyond;
     if (s->detect == NULL || s->detect->surfaces == NULL) return;
     surface_return(s->detect->surfaces, p->n - first, p->label + first, p->cosine + first, p->rho + first);
+    if (s->detect->depth > 0) surface_return(s->detect->surfaces, b->n, b->label, b->cosine, b->rho);
 }
 
 /* Follows rays of the pool from `at` on beyond their first hits. */
@@ -24,8 +26,15 @@ static void look_through(struct caster *c, const struct cast_setup *s, const str
     caster_follow(&c->nearest, s, hits, &c->paths);
     for (uint32_t i = 0; i < hits->rays.n; i++) {
         b->first[at + i] = b->n;
-        for (uint32_t k = p->first[i]; k != CAST_NO_PATH; k = p->found[k].next)
-            b->hit[b->n++] = p->found[k];
+        for (uint32_t k = p->first[i]; k != CAST_NO_PATH; k = p->found[k].next) {
+            uint32_t to = b->n++;
+            b->range_m[to] = p->found[k].range_m;
+            b->cosine[to] = p->found[k].cosine;
+            b->share[to] = p->found[k].energy;
+            b->label[to] = p->found[k].label;
+            if (hits->colour != NULL) b->colour[to] = p->found[k].colour;
+            b->ghost[to] = p->found[k].ghost;
+        }
         b->count[at + i] = b->n - b->first[at + i];
     }
 }
@@ -131,16 +140,14 @@ static void add_hits(struct caster *c, const struct chunk *k, const struct job *
     add_return(c, s, &r, 1.0, p->rho[i]);
     if (s->detect == NULL || s->detect->depth == 0) return;
     for (uint32_t j = b->first[i]; j < b->first[i] + b->count[i]; j++) {
-        const struct path_hit *hit = &b->hit[j];
-        double rho;
-        r.range_m = hit->range_m;
-        r.label = hit->label;
-        if (k->texels) r.colour = hit->colour;
-        if (k->spreads) r.sigma_m = beam_round_sigma(&s->beam->beam, r.range_m, hit->cosine, (double)p->xx[i]);
+        r.range_m = b->range_m[j];
+        r.label = b->label[j];
+        if (k->texels) r.colour = b->colour[j];
+        if (k->spreads) r.sigma_m = beam_round_sigma(&s->beam->beam, r.range_m, b->cosine[j], (double)p->xx[i]);
         uint32_t before = c->sub_rays->n_returns;
-        surface_return(s->detect->surfaces, 1, &hit->label, &hit->cosine, &rho);
-        add_return(c, s, &r, hit->energy, rho);
-        if (hit->ghost && c->sub_rays->n_returns > before) c->sub_rays->returns[before].label += s->detect->ghost_label;
+        add_return(c, s, &r, b->share[j], b->rho[j]);
+        if (b->ghost[j] && c->sub_rays->n_returns > before)
+            c->sub_rays->returns[before].label += s->detect->ghost_label;
     }
 }
 

@@ -32,7 +32,11 @@ struct pool {
 struct beyond {
     uint32_t first[POOL_ROOM], count[POOL_ROOM]; /* of a sub-ray */
     uint32_t n;
-    struct path_hit hit[POOL_ROOM * CAST_MAX_DEPTH];
+    double range_m[POOL_ROOM * CAST_MAX_DEPTH], cosine[POOL_ROOM * CAST_MAX_DEPTH];
+    double share[POOL_ROOM * CAST_MAX_DEPTH]; /* of the sub-ray's energy */
+    double rho[POOL_ROOM * CAST_MAX_DEPTH];
+    uint32_t label[POOL_ROOM * CAST_MAX_DEPTH], colour[POOL_ROOM * CAST_MAX_DEPTH];
+    uint8_t ghost[POOL_ROOM * CAST_MAX_DEPTH];
 };
 
 /* A pulse for which one ray is not enough. */

@@ -147,13 +147,15 @@ static int scale_stations(struct site *site, double scale_m, struct sh_err *err)
     return rc;
 }
 
-/* Chooses the finest 1e-6 x 10^n m with which everything fits, unless the configuration names a scale. */
+/* Chooses the finest 1e-6 x 10^n m with which everything fits, unless the configuration names a scale. In the polar
+ * layout there always is one. */
 static int choose_scale(struct site *site, struct sh_err *err)
 {
     const double given_m = site->cfg->output.scale_m;
+    const int polar = site->cfg->output.layout == LINE_POLAR;
     double scale_m = given_m > 0.0 ? given_m : FINEST_M;
     int rc = scale_stations(site, scale_m, err);
-    while (rc != SH_OK && given_m <= 0.0 && scale_m < 1.0)
+    while (rc != SH_OK && given_m <= 0.0 && (polar || scale_m < 1.0))
         rc = scale_stations(site, scale_m *= 10.0, err);
     return rc;
 }

@@ -90,6 +90,8 @@ static void test_counts(void **state)
         {4300, "layout: polar", "range: off", 1e-5,
          "4300 m must fit into 32 bits, but at 1e-06 m only those up to 4295 m"},
         {1000, "layout: polar", "ball: {radius_m: 100, distance_1_m: 0.05}", 1e-5, "ranges up to 6100 m"},
+        /* The polar scale has no end: ranges of 1e10 m need more than a metre a count, since 32 bits end at 4.29e9. */
+        {1000, "layout: polar", "ball: {radius_m: 100, distance_1_m: 100, factor: [1000, 1, 1]}", 10, "ranges up to 1"},
         /* Errors of the instrument's readings count: 1.5 m more or less, or 0.1 % of it, each alone. */
         {4294, "layout: polar", "range: off}\ninstrument: {range_offset_m: 1.5", 1e-5, "ranges up to 4295.5 m"},
         {4294, "layout: polar", "range: off}\ninstrument: {range_offset_m: -1.5", 1e-5, "ranges up to 4295.5 m"},

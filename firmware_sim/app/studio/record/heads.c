@@ -180,7 +180,9 @@ static int check_all(struct heads *heads, uint32_t first, uint32_t last, struct 
 {
     uint8_t is_known[CONFIG_MAX_STATIONS] = {1};
     struct scanner_report report;
+    struct sh_report quiet = *heads->report;
     const uint32_t begins = head_of(heads, first);
+    quiet.progress = NULL;
     int rc = check_fits(heads, 0, heads->first->site, first, last, err);
     if (rc == SH_OK) rc = open_one(heads, &heads->one[begins], err);
     if (rc == SH_OK && begins != 0) rc = check_fits(heads, begins, heads->one[begins].offline.site, first, last, err);
@@ -190,8 +192,7 @@ static int check_all(struct heads *heads, uint32_t first, uint32_t last, struct 
         struct site *site = NULL;
         if (is_known[k]) continue;
         is_known[k] = 1;
-        scanner_report_set_up(&report, heads->report, s, &heads->warnings);
-        report.report.progress = NULL;
+        scanner_report_set_up(&report, &quiet, s, &heads->warnings);
         rc = offline_load(heads->one[k].cfg, heads->first->site, &report.report, &site, err);
         if (rc == SH_OK) rc = check_fits(heads, k, site, first, last, err);
         site_free(site);
