@@ -26,11 +26,12 @@ static void replay_fail(struct replay *r, const struct sh_err *err)
     pthread_mutex_unlock(&r->lock);
 }
 
-/* Only for the first round: later ones repeat the recording, but the time of day goes on. */
-static void take_clock(struct replay *r, int64_t shift_ns)
+/* Takes the time of day from a frame that is skipped. Here and in replay_add that is only for the first round: later
+ * ones repeat the recording, but the time of day goes on. */
+static void take_skipped_clock(struct replay *r)
 {
     pthread_mutex_lock(&r->lock);
-    replay_clock_take(&r->clock, r->frame.bytes, shift_ns);
+    replay_clock_take(&r->clock, r->frame.bytes, 0);
     pthread_mutex_unlock(&r->lock);
 }
 
@@ -48,7 +49,7 @@ static int replay_look(struct replay *r)
         const int is_early = since_ns < r->begin_s * 1e9 || (r->is_device && r->frame.bytes[1] != NATIVE_POINTS);
         if (!r->in_range && is_early) {
             replay_keep_front(&r->front, r->frame.bytes);
-            if (r->times == 0) take_clock(r, 0);
+            if (r->times == 0) take_skipped_clock(r);
             r->has_skipped = 1;
             continue;
         }
@@ -79,6 +80,7 @@ static void replay_add(struct replay *r, const uint8_t *frame, uint32_t len, uin
     pthread_mutex_lock(&r->lock);
     r->position_ns = native_since_ns(r->frame.t_ns, r->first_ns);
     replay_note_frame(r, frame, tick);
+    if (r->times == 1) replay_clock_take(&r->clock, frame, r->shift_ns);
     pthread_mutex_unlock(&r->lock);
 }
 
@@ -210,7 +212,6 @@ void replay_fill(struct replay *r, uint64_t tick, int may_skip)
         if (due > tick) r->start_tick -= due - tick;           /* may wrap below 0: due_tick() wraps back */
         if (r->len + r->frame.len > REPLAY_MOST_BYTES) return; /* the rest comes with the next tick */
         set_shift(r);
-        if (r->times == 1) take_clock(r, r->shift_ns);
         replay_add(r, r->frame.bytes, r->frame.len, tick);
         r->has_frame = 0;
     }

@@ -26,10 +26,20 @@ export function recorded(name, settings, ...options) {
   return {...JSON.parse(text), file};
 }
 
+// Waits until the element is where it was two frames before: a page that has just got another size moves it.
+async function standsStill(page, selector) {
+  const place = () => page.eval(`new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => {
+    const {left, top, width, height} = document.querySelector('${selector}').getBoundingClientRect();
+    done([left, top, width, height].join());
+  })))`);
+  for (let was = '', now = await place(); now !== was;) [was, now] = [now, await place()];
+}
+
 /** Returns two places on the screen: where station 1 stands, at the origin, and (1.5, 2) of the scene at its height. */
 export async function placesToDrag(page) {
   await page.click('#fit');
   await page.where('#picture');
+  await standsStill(page, '#picture');
   return page.eval(`(() => {
     const {left, top} = document.querySelector('#picture').getBoundingClientRect();
     const at = (x, y) => { const p = scanhead.view.camera.project([x, y, 1.6]); return [left + p.x, top + p.y]; };

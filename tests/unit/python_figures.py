@@ -17,7 +17,7 @@ def geodetic(lon_deg, count, echo=1, echoes=1, moving=0):
     raw = scanhead._raw_columns(bytes(40) + record, 1)
     points = scanhead._common(raw, 1000, scanhead.GEO)
     scanhead._geo_points(points, raw, {"crs": scanhead.CRS_GEODETIC, "anchor": (10.0, lon_deg, 100.0),
-                                       "scale": (1e-8, 1e-8, 1e-3), "moving": moving})
+                                       "scale": (1e-8, 1e-8, 1e-3), "heights": 0, "moving": moving})
     return points
 
 

@@ -319,6 +319,7 @@ int session_setup(void **state)
 int session_teardown(void **state)
 {
     (void)state;
+    session_close_protocol(&pump, s);
     faulty_ops(pump.link)->close(pump.link);
     unit_queue_free(&s->units);
     free(pump.tick);
