@@ -203,6 +203,8 @@ test('all points are in the box of a section; a view of everything leaves out st
   near(view.min[2], 0, 0.1, 'and not in the view'); // the limits are 2 % of the height wider
   const section = Section.around(all, 'box').relativeTo([0, 0, 0]);
   same([-104, 3].map((z) => isWithin(section, 0, 0, z)), [true, true], 'the section around them');
+  const cut = Section.around(all, 'height', view).relativeTo([0, 0, 0]); // at two thirds of 3 m
+  same([-104, 1.9, 2.1].map((z) => isWithin(cut, 0, 0, z)), [true, true, false], 'a cut of the heights without them');
   near(boxOf({count: 600, bounds: null, blocks: []}, [{x_m: 1, y_m: 2, z_m: 3}], no).max[0], 6, 0, 'no point has a place');
 });
 

@@ -121,7 +121,7 @@ export class Recording {
       say(this.#parts.done, this.#parts.says.textContent);
     } catch (error) {
       if (signal.aborted) return;
-      const words = error.message.replace(/^per_m2=[^:]*/, 'Density');
+      const words = error.message.replace(/^per_m2=.*?(?=: (allowed|more) )/, 'Density');
       markField(this.#parts.density, words === error.message);
       this.#parts.says.className = 'refusal';
       say(this.#parts.says, words);

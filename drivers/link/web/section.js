@@ -21,10 +21,11 @@ export class Section {
     Object.assign(this, from);
   }
 
-  // Returns a section with all of {min, max} in it, a little larger; a height cut takes the upper third away.
-  static around({min, max}, kind) {
+  // Returns a section with all of {min, max} in it, a little larger. A height cut takes the upper third of `usual` away,
+  // the box without stray points.
+  static around({min, max}, kind, usual = {min, max}) {
     const margin = 0.01 * Math.hypot(...sub(max, min)) + THIN;
-    const top = kind === 'height' ? min[2] + (max[2] - min[2]) * 2 / 3 : max[2] + margin;
+    const top = kind === 'height' ? usual.min[2] + (usual.max[2] - usual.min[2]) * 2 / 3 : max[2] + margin;
     const from = min.map((v) => v - margin), to = [max[0] + margin, max[1] + margin, top];
     return new Section({kind, middle: from.map((v, a) => 0.5 * (v + to[a])), half: from.map((v, a) => 0.5 * (to[a] - v))});
   }

@@ -67,7 +67,7 @@ export class SectionTool {
       this.#kinds.get('off').checked = true;
       return say(this.#says, 'There is nothing to cut yet: no points and no scene.');
     }
-    this.#view.camera.section = box && Section.around(box, kind);
+    this.#view.camera.section = box && Section.around(box, kind, this.#view.usualBounds());
     this.#kinds.get(kind).checked = true;
     this.#handles.clear();
     this.#layer.replaceChildren();

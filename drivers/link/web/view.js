@@ -206,9 +206,14 @@ export class View extends EventTarget {
   // Returns {min, max} around all points, the stations and the scene. null: there is nothing, not even a station.
   bounds() { return boxAround(this.cloud, this.stations.list, this.#solids); }
 
+  // Returns {min, max} without stray points: around the scene, or around the points where there is none. null: as bounds().
+  usualBounds() { return boxOf(this.cloud, this.stations.list, this.#solids, true); }
+
+  // The handles of a section box stand on its sides, so these are shown, too.
   fit() {
-    const box = boxOf(this.cloud, this.stations.list, this.#solids);
-    if (box) this.camera.fit(this.camera.section?.within(box) ?? box);
+    const {section} = this.camera;
+    const box = section?.kind === 'box' ? this.bounds() : boxOf(this.cloud, this.stations.list, this.#solids);
+    if (box) this.camera.fit(section?.within(box) ?? box);
     this.cameraMoved();
   }
 
@@ -267,7 +272,7 @@ export class View extends EventTarget {
   #fitUntouched() {
     if (this.#touched) return;
     this.#fitted = this.cloud.total;
-    const box = boxOf(this.cloud, this.stations.list, this.#solids, true);
+    const box = this.usualBounds();
     if (box === null) return;
     this.camera.fit(box);
     this.cameraMoved();
