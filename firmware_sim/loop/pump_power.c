@@ -4,9 +4,9 @@
  *
  * All frames before the tick with which power goes are written, if the client reads fast enough; in the paces that wait
  * for readers, in any case. Bytes that the client's system has not taken by then may be lost with the connection. A
- * link without a connection, such as a file or UDP, goes on; another protocol than the native one is silent until power
- * comes, and begins anew then. With `loop.pace: step`, links come back
- * at once, since their clients let time pass. */
+ * link without a connection, such as a file or UDP, goes on where it was; a protocol that is not native is silent until
+ * power comes, and begins anew then. With `loop.pace: step`, links come back at once, since their clients let time
+ * pass. */
 #include "firmware_sim/loop/pump_inside.h"
 
 /* Whether everything released before `tick` is written, or the client does not take it. */
