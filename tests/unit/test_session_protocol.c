@@ -311,6 +311,31 @@ static void a_session_outlasts_power(void **state)
     expect_log("");
 }
 
+/* A session that outlasts power takes no tick beyond a change of power until the link has carried that out, though later
+ * changes are known. So its log is the same however far the head is ahead. */
+static void power_changes_in_turn(void **state)
+{
+    (void)state;
+    static const char *const logs[] = {"1|2|destroy|", "create |open 4|", "5|destroy|", "create |open 7|", "8|"};
+    static const uint64_t ticks[] = {2, 4, 5, 7};
+    open_session();
+    own_link.end = NULL;
+    stream.waits = 1;
+    for (int i = 0; i < 4; i++)
+        stream_power(&stream, ticks[i]);
+    for (int i = 0; i < 8; i++)
+        release(0);
+    s->cursor = 0;
+    logged[0] = '\0';
+    for (uint32_t i = 0; i < 5; i++) {
+        session_write_protocol(&pump, s, 2);
+        assert_int_equal(s->cursor, i < 4 ? ticks[i] : 8);
+        assert_int_equal(pump_power(&pump, 0), i < 4);
+        expect_log(logs[i]);
+        assert_int_equal(pump.power_seen, i < 4 ? i + 1 : 4);
+    }
+}
+
 /* Settings that were stored are tried when the link is opened. */
 static void stored_settings_are_checked(void **state)
 {
@@ -362,6 +387,7 @@ int main(void)
         WITH_SESSION(a_failing_link_ends_the_session),
         WITH_SESSION(a_client_joins_late),
         WITH_SESSION(a_session_outlasts_power),
+        WITH_SESSION(power_changes_in_turn),
         WITH_SESSION(stored_settings_are_checked),
         WITH_SESSION(ticks_are_shifted_and_overtaken),
     };
