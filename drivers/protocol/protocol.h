@@ -195,9 +195,8 @@ struct protocol_ops {
     /* Frees what the instance holds, but not the instance itself. `protocol` may be NULL, as may this function. */
     void (*end)(void *protocol);
 
-    /* The client is there. t_ns: device time of the tick from which on the client gets frames. Where a session outlasts
-     * a loss of power, as that of a file does, t_ns is when power comes, and time() may be called with earlier times.
-     * May be NULL. */
+    /* The client is there. t_ns: device time of the tick from which on the client gets frames. A session that outlasts
+     * a loss of power, as that of a file does, gets a new instance when power comes. May be NULL. */
     void (*open)(void *protocol, int64_t t_ns);
     /* One whole native frame, checked, in the order of the stream. A client that joins late gets descriptor,
      * emitter and anchor first. Never called with frames of the geo layout where needs has POLAR. May be NULL: the

@@ -14,6 +14,7 @@ struct posted {
     char *text;      /* of an error */
     int apply;       /* 0: the form is only checked */
     const char *key; /* whose value is at hand */
+    int laser_on;    /* the form has laser=on */
 };
 
 static int refuse(const struct posted *p, int status, const char *why)
@@ -71,7 +72,10 @@ static int start(const struct posted *p)
     const enum protocol_head_state state = protocol_ask_state(&p->spec->host);
     if (state == PROTOCOL_HEAD_SCANNING || state == PROTOCOL_HEAD_SPIN_UP) return 200;
     if (state == PROTOCOL_HEAD_IDLE || state == PROTOCOL_HEAD_UNKNOWN) return command(p, "SCAN:START");
-    return refuse(p, 503, "the head can't start now: it boots, spins down or has failed; nothing has changed");
+    /* While the form is carried out, the head may have failed, or another client may have stopped it, just now. */
+    return refuse(p, 503,
+                  p->apply ? "the head can't start now: it boots, spins down or has failed"
+                           : "the head can't start now: it boots, spins down or has failed; nothing has changed");
 }
 
 static int set_laser(const struct posted *p, const char *value)
@@ -104,6 +108,8 @@ static int set_rpm(const struct posted *p, const char *value)
     long rpm;
     if (!read_number(value, &rpm) || (rpm != 0 && (rpm < 300 || rpm > 1200)))
         return refuse(p, 400, "rpm: allowed are whole numbers from 300 to 1200, and 0: the motor stops");
+    if (rpm == 0 && p->laser_on)
+        return refuse(p, 400, "rpm=0 and laser=on: allowed is one of them; nothing has changed");
     if (rpm == 0) return is_scanning(p->spec) ? command(p, "SCAN:STOP") : 200;
     const long uhz = (rpm * 1000000 + 30) / 60;
     snprintf(line, sizeof line, "HEAD:LINES %ld.%06ld", uhz / 1000000, uhz % 1000000);
@@ -316,6 +322,8 @@ int velodyne_post(const struct protocol_spec *spec, const char *path, const char
     memcpy(copy, form, len);
     const int n = read_form(&posted, path, copy, unify(path, copy, len), pairs);
     int status = n < 0 ? -n : 200;
+    for (int i = 0; i < n; i++)
+        posted.laser_on |= pairs[i].setting->set == set_laser && strcasecmp(pairs[i].value, "on") == 0;
     for (; posted.apply < 2; posted.apply++)
         for (int i = 0; i < n && status == 200; i++) {
             posted.key = pairs[i].setting->key;

@@ -232,13 +232,13 @@ enum protocol_pps device_pps(void *self, int64_t t_ns, int64_t *hour_ns);
  * mirror changes speed. */
 uint64_t device_rests_from(void *self);
 
-/* The last power-up. While power is off, all members but t_ns are those of the power-up before. */
+/* The last power-up as of a device time. While power is off, all members but t_ns are those of the power-up before. */
 struct device_power_up {
     int64_t t_ns;       /* device time at which power came, or will come back; 0: it has always been on */
     uint32_t ons;       /* how often power has come, including the first time */
     uint32_t near_wrap; /* since then counters begin this far below their wrap; 0: they begin at 0 */
 };
-struct device_power_up device_last_power(void *self);
+struct device_power_up device_last_power(void *self, int64_t t_ns);
 
 /* Loss of optical power at the window by injected faults, both ways together, dB; 0 without a scan. The loss is that of
  * the last tick that was claimed. */

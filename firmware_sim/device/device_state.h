@@ -35,7 +35,7 @@ struct device_live {
     uint64_t said_tick; /* tick of the last event about late poses */
 };
 
-enum { DEVICE_MAX_CHANGES = 32, DEVICE_SURFACES_A_FRAME = 64 };
+enum { DEVICE_MAX_CHANGES = 32, DEVICE_MAX_POWER_UPS = 32, DEVICE_SURFACES_A_FRAME = 64 };
 
 /* The state machine of the head. */
 struct device_machine {
@@ -53,13 +53,17 @@ struct device_machine {
     uint32_t n_stopped;
 };
 
-/* When power last went, and when it came back or will. */
+/* When power last went, and when it came back or will. Sessions lag behind the device, so earlier times are kept. */
 struct device_power {
     uint64_t off_tick, on_tick; /* 0: it has always been on */
     int boot_begins;            /* a boot begins in the tick at hand */
     int reboots;                /* a command asked for it: power goes with the next tick, for one tick */
-    uint32_t again;             /* how often power has come back */
-    uint32_t near_wrap;         /* counters begin this far below their wrap */
+    /* Number i is at i % DEVICE_MAX_POWER_UPS. Number 0 is the first power-up, with 0 and 0. */
+    struct device_power_up_at {
+        uint64_t off_tick, on_tick; /* power went, and came or will come */
+        uint32_t near_wrap;         /* since then counters begin this far below their wrap */
+    } up[DEVICE_MAX_POWER_UPS];
+    uint32_t n_ups;
 };
 
 /* The journal that is written, and the one that is replayed. */
@@ -214,6 +218,9 @@ void device_init_time_server(struct device *device);
 void device_start_date(struct device *device, int64_t t_ns);
 /* Wakes up the client of the time server. The server, or whether it may be asked, has changed. */
 void device_say_time_server(const struct device *device);
+
+/* power.c: as device_last_power; the caller has the lock. */
+struct device_power_up device_power_at(const struct device *device, int64_t t_ns);
 
 /* time_of_day.c: the head's clock and the receiver. */
 /* GPS time, ns, of a device time by the head's clock; 0: unknown. */

@@ -22,6 +22,16 @@ static void end_slow_boots(struct device *device, uint64_t tick)
     }
 }
 
+static struct device_power_up_at *newest(struct device_power *power)
+{
+    return &power->up[(power->n_ups - 1) % DEVICE_MAX_POWER_UPS];
+}
+
+static void set_on_tick(struct device *device, uint64_t tick)
+{
+    device->machine.due_tick = device->power.on_tick = newest(&device->power)->on_tick = tick;
+}
+
 /* Turns power off. No event reports the end of the scan: readers see that it stops. */
 static void turn_off(struct device *device, uint64_t tick, uint64_t until_tick)
 {
@@ -35,21 +45,26 @@ static void turn_off(struct device *device, uint64_t tick, uint64_t until_tick)
     memset(device->events.errors, 0, sizeof device->events.errors);
     device_transition(device, HEAD_EV_POWER_OFF, tick);
     device->power.off_tick = tick;
-    device->machine.due_tick = device->power.on_tick = until_tick;
+    const struct device_power_up_at next = {.off_tick = tick, .near_wrap = newest(&device->power)->near_wrap};
+    device->power.n_ups++;
+    *newest(&device->power) = next;
+    set_on_tick(device, until_tick);
 }
 
 static void set_near_wrap(struct device *device, uint64_t tick)
 {
     const struct head_fault *f = NULL;
-    device->power.near_wrap = 0;
+    uint32_t *near_wrap = &newest(&device->power)->near_wrap;
+    *near_wrap = 0;
     while ((f = head_faults_at(&device->head_faults, FAULT_COUNTERS_HIGH, time_of(device, tick), f)) != NULL)
-        device->power.near_wrap = fault_n(&f->fault);
+        *near_wrap = fault_n(&f->fault);
 }
 
 void device_first_power(struct device *device)
 {
     static const struct head_faults_tick first = {0};
     head_faults_step(&device->head_faults, 0, &first); /* only takes over the list */
+    device->power.n_ups = 1;
     set_near_wrap(device, 0);
     device_start_date(device, 0);
     device_transition(device, HEAD_EV_POWER_ON, 0);
@@ -65,7 +80,6 @@ static void turn_on(struct device *device, uint64_t tick)
     memset(device->station_scans, 0, device->site->n_stations * sizeof *device->station_scans);
     set_near_wrap(device, tick);
     device_start_date(device, time_of(device, tick));
-    device->power.again++;
     device_before_scans(device);
     device_transition(device, HEAD_EV_POWER_ON, tick);
 }
@@ -129,7 +143,7 @@ void device_run_power(struct device *device, uint64_t tick, struct device_work *
     const uint64_t until_tick = goes_until(device, tick);
     work->power = DEVICE_POWER_STAYS;
     if (device->machine.state == HEAD_OFF) {
-        if (until_tick > device->power.on_tick) device->machine.due_tick = device->power.on_tick = until_tick;
+        if (until_tick > device->power.on_tick) set_on_tick(device, until_tick);
         if (device->machine.due_tick <= tick) {
             turn_on(device, tick);
             work->power = DEVICE_POWER_COMES;
@@ -147,12 +161,23 @@ int device_is_dead(const struct device *device, uint64_t released)
     return power->on_tick != 0 && device->next_tick > power->off_tick && released < power->on_tick;
 }
 
-struct device_power_up device_last_power(void *self)
+struct device_power_up device_power_at(const struct device *device, int64_t t_ns)
+{
+    const struct device_power *power = &device->power;
+    const uint32_t kept = power->n_ups < DEVICE_MAX_POWER_UPS ? power->n_ups : DEVICE_MAX_POWER_UPS;
+    uint32_t i = power->n_ups - 1; /* the oldest one that is kept also covers the time before */
+    while (i > power->n_ups - kept && time_of(device, power->up[i % DEVICE_MAX_POWER_UPS].off_tick) > t_ns)
+        i--;
+    const struct device_power_up_at *last = &power->up[i % DEVICE_MAX_POWER_UPS];
+    const int64_t on_ns = time_of(device, last->on_tick);
+    return (struct device_power_up){on_ns, i + (on_ns <= t_ns), last->near_wrap};
+}
+
+struct device_power_up device_last_power(void *self, int64_t t_ns)
 {
     struct device *device = self;
-    const struct device_power *power = &device->power;
     pthread_mutex_lock(&device->lock);
-    const struct device_power_up last = {time_of(device, power->on_tick), power->again + 1, power->near_wrap};
+    const struct device_power_up last = device_power_at(device, t_ns);
     pthread_mutex_unlock(&device->lock);
     return last;
 }

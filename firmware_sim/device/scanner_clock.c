@@ -70,7 +70,7 @@ void device_get_time_server(struct device *device, struct device_time_server *ou
                                        .port = (uint16_t)ntp->port,
                                        .asks = wants && may,
                                        .refused = wants && !may,
-                                       .power_ons = device->power.again + 1,
+                                       .power_ons = device->power.n_ups,
                                        .max_offset_ns = device->cmd.answers.max_offset_ns};
     pthread_mutex_unlock(&device->lock);
 }
@@ -116,7 +116,7 @@ int device_shift_date(struct device *device, const struct device_time_server *as
     char line[40];
     pthread_mutex_lock(&device->lock); /* a client may set the clock, and power may go, at any moment */
     const int is_asked =
-        memcmp(&device->cmd.server, &asked->set, sizeof asked->set) == 0 && device->power.again + 1 == asked->power_ons;
+        memcmp(&device->cmd.server, &asked->set, sizeof asked->set) == 0 && device->power.n_ups == asked->power_ons;
     if (is_asked) {
         snprintf(line, sizeof line, "TIME:SHIFt %lld", (long long)(device->cmd.shift_ns + by_ns));
         device_carry_out_line(device, line);

@@ -188,12 +188,10 @@ int64_t device_next_fix_ns(void *self, int64_t t_ns)
 }
 
 /* Whether the head had power when a sentence arrived, and has had it since then up to t_ns. It remembers nothing over a
- * power cycle, and has no receiver while power is off. Only the last power cycle matters: sessions lag by less. */
+ * power cycle, and has no receiver while power is off. */
 static int is_received(const struct device *device, int64_t arrived_ns, int64_t t_ns)
 {
-    const int64_t off_ns = (int64_t)device->power.off_tick * device->tick_ns;
-    const int64_t on_ns = (int64_t)device->power.on_tick * device->tick_ns;
-    return device->power.on_tick == 0 || t_ns < off_ns || arrived_ns >= on_ns;
+    return arrived_ns >= device_power_at(device, t_ns).t_ns;
 }
 
 /* Finds the head's poses around a time. 0: the head stands, or it has no pose. Just before the time a live platform may

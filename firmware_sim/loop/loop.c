@@ -33,7 +33,7 @@ static int create_stream(struct loop *loop, struct sh_err *err)
     loop->stream.as_they_are = makes;
     loop->stream.waits = cfg->loop.pace != PACE_REALTIME;
     loop->stream.steps = cfg->loop.pace == PACE_STEP;
-    loop->stream.seq = loop->stream.first_seq = makes ? 0 : UINT32_C(0) - device_last_power(loop->device).near_wrap;
+    loop->stream.seq = loop->stream.first_seq = makes ? 0 : UINT32_C(0) - device_last_power(loop->device, 0).near_wrap;
     loop->stream.counters = source->ops->counters(source->self);
     return stream_create(&loop->stream, &size, tick_ns, err);
 }

@@ -95,7 +95,7 @@ void session_know_next(struct pump *pump, struct session *s)
 
 /* Frames are rare where nothing is scanned, and empty ticks wake nobody. So the ring may no longer have the ticks that
  * a session has not taken, and yet none of them had a frame. */
-void session_catch_up(struct pump *pump, struct session *s, uint64_t released, uint64_t off_tick)
+void session_catch_up(struct pump *pump, struct session *s, uint64_t released, uint64_t power_tick)
 {
     struct ring *ring = &pump->stream->ring;
     struct ring_copy tick = {.buf = NULL};
@@ -104,7 +104,7 @@ void session_catch_up(struct pump *pump, struct session *s, uint64_t released, u
                          tick.first_seq == s->lost.next_seq;
     ring_leave(ring, s->reader);
     s->cursor = is_whole ? oldest : released - ring->queue_ticks / 2; /* half a queue of room to recover */
-    if (s->cursor > off_tick) s->cursor = off_tick;
+    if (s->cursor > power_tick) s->cursor = power_tick;
 }
 
 /* Frames of the stream, and pulses in them, that are in the session's buffer and were not written as a whole.

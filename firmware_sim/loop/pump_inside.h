@@ -57,7 +57,8 @@ struct session {
     struct session_commands commands;
     /* of a protocol that is not native */
     struct pump *pump;
-    void *protocol;
+    void *protocol; /* NULL while is_off */
+    int is_off;     /* the head has no power: ticks pass, and nothing is sent or heard */
     struct unit_queue units;
     int answering; /* input() is being called */
     int hang_up;   /* the session ends once its units are out */
@@ -109,11 +110,13 @@ void session_shut(struct pump *pump, struct session *s);
 /* As session_close, but when power goes. Neither the protocol is told that the client went, nor does the session give
  * back its control: the device does that itself. */
 void session_cut(struct pump *pump, struct session *s);
-/* Returns the first tick that the session does not take any more, since power goes with it; UINT64_MAX: none. */
-uint64_t session_off_tick(const struct pump *pump, const struct session *s);
-/* Begins a session anew when power goes with a tick. For sessions that outlast the loss of power, such as that of a
- * file. */
-void session_restart(struct pump *pump, struct session *s, uint64_t tick);
+/* Returns the first tick that the session does not take until pump_power has done what is due: power goes with it, or
+ * comes where is_off. UINT64_MAX: none. */
+uint64_t session_power_tick(const struct pump *pump, const struct session *s);
+/* For sessions that outlast a loss of power, such as that of a file: power goes with a tick, and comes with one. A
+ * protocol that is not native ends with power, and begins anew when power comes. */
+void session_power_off(struct pump *pump, struct session *s, uint64_t tick);
+void session_power_on(struct pump *pump, struct session *s, uint64_t tick);
 /* Takes released ticks and replies, and writes until the link is full (1) or nothing is left (0). index: of the session
  * on its link. */
 int session_write(struct pump *pump, struct session *s, int index);
@@ -145,8 +148,8 @@ int pump_power(struct pump *pump, uint32_t full);
 void session_know_next(struct pump *pump, struct session *s);
 /* Moves the cursor on, since the ring no longer has its tick. The cursor goes to the oldest tick of the queue if no
  * frame is lost before that, else to the middle of the queue, so that the reader has time to recover. The cursor does
- * not go beyond off_tick. */
-void session_catch_up(struct pump *pump, struct session *s, uint64_t released, uint64_t off_tick);
+ * not go beyond power_tick. */
+void session_catch_up(struct pump *pump, struct session *s, uint64_t released, uint64_t power_tick);
 /* Compares the number of a tick's first frame with the expected one, and counts a gap. A native reader gets an event
  * frame before the tick's frames. The tick's frames lie at the end of the session's buffer, with REPLY_ROOM / 8 bytes
  * free after them. `released`: ticks released when the tick was read. Returns how many frames are missing. */
@@ -180,8 +183,8 @@ void pump_read_commands(struct pump *pump, struct session *s, int index);
 /* Returns 0 or a negative SH_E. */
 int session_open_protocol(struct pump *pump, struct session *s, struct sh_err *err);
 void session_close_protocol(struct pump *pump, struct session *s);
-/* Closes the session and opens it again at the cursor. */
-int session_restart_protocol(struct pump *pump, struct session *s);
+/* Opens a session that was closed when power went, again at the cursor. Returns as session_open_protocol. */
+int session_reopen_protocol(struct pump *pump, struct session *s);
 /* As session_write. */
 int session_write_protocol(struct pump *pump, struct session *s, int index);
 /* Reads bytes of a client, for the protocol. */

@@ -4,8 +4,9 @@
  *
  * All frames before the tick with which power goes are written, if the client reads fast enough; in the paces that wait
  * for readers, in any case. Bytes that the client's system has not taken by then may be lost with the connection. A
- * link without a connection, such as a file or UDP, goes on where it was. With `loop.pace: step`, links come back
- * at once, since their clients let time pass. */
+ * link without a connection, such as a file or UDP, goes on where it was; a protocol that is not native is silent until
+ * power comes, and begins anew then. With `loop.pace: step`, links come back at once, since their clients let time
+ * pass. */
 #include "firmware_sim/loop/pump_inside.h"
 
 /* Whether everything released before `tick` is written, or the client does not take it. */
@@ -29,7 +30,7 @@ static void unplug(struct pump *pump, uint64_t tick)
         struct session *s = &pump->session[i];
         if (!s->open) continue;
         if (!pump->can_unplug && pump->ops->end == NULL) {
-            session_restart(pump, s, tick);
+            session_power_off(pump, s, tick);
             continue;
         }
         session_cut(pump, s);
@@ -40,6 +41,13 @@ static void unplug(struct pump *pump, uint64_t tick)
     if (pump->stream->steps) plug(pump);
 }
 
+static void power_on(struct pump *pump, uint64_t tick)
+{
+    plug(pump);
+    for (int i = 0; i < LINK_MAX_SESSIONS; i++)
+        if (pump->session[i].open) session_power_on(pump, &pump->session[i], tick);
+}
+
 int pump_power(struct pump *pump, uint32_t full)
 {
     uint64_t tick;
@@ -47,13 +55,14 @@ int pump_power(struct pump *pump, uint32_t full)
     while (!pump->is_clean && (tick = stream_power_tick(pump->stream, pump->power_seen)) != UINT64_MAX) {
         const int goes = pump->power_seen % 2 == 0;
         if (stream_released(pump->stream) <= tick) return more;
-        for (int i = 0; i < LINK_MAX_SESSIONS && goes; i++)
-            if (pump->session[i].open && !is_drained(pump, &pump->session[i], (int)(full >> i & 1), tick))
+        for (int i = 0; i < LINK_MAX_SESSIONS; i++)
+            if (pump->session[i].open && (goes || pump->session[i].is_off) &&
+                !is_drained(pump, &pump->session[i], (int)(full >> i & 1), tick))
                 return more || !pump->stream->waits;
         if (goes)
             unplug(pump, tick);
         else
-            plug(pump);
+            power_on(pump, tick);
         pump->power_seen++;
         more = 1; /* sessions that go on can now take this tick */
     }

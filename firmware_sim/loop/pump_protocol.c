@@ -148,7 +148,8 @@ static void look_back(const struct pump *pump, struct session *s)
     const struct loop_source *source = pump->links->source;
     const uint64_t ticks = pump->stream->ring.queue_ticks / 4 * 3; /* with room for those that come meanwhile */
     if (pump->links->identity.fields == NULL || pump->stream->waits) return;
-    const uint64_t power = (uint64_t)(source->ops->last_power(source->self).t_ns / pump->stream->tick_ns);
+    const int64_t power_ns = source->ops->last_power(source->self, time_of(pump, s->cursor)).t_ns;
+    const uint64_t power = (uint64_t)(power_ns / pump->stream->tick_ns);
     uint64_t from = s->cursor > ticks ? s->cursor - ticks : 0;
     if (from < power) from = power;
     s->power_from = s->came_at = s->cursor; /* power that went before the client came doesn't end its session */
@@ -180,7 +181,7 @@ _Static_assert((int)PROTOCOL_STORED == (int)SETTINGS_FILE_TEXT, "what a protocol
 static int pump_protocol_create(struct pump *pump, struct session *s, struct sh_err *err)
 {
     const struct loop_source *source = pump->links->source;
-    const struct device_power_up power = source->ops->last_power(source->self);
+    const struct device_power_up power = source->ops->last_power(source->self, time_of(pump, s->cursor));
     char stored[SETTINGS_FILE_TEXT] = "";
     struct protocol_spec spec = {
         .identity = &pump->links->identity,
@@ -236,15 +237,11 @@ int session_open_protocol(struct pump *pump, struct session *s, struct sh_err *e
     return rc;
 }
 
-int session_restart_protocol(struct pump *pump, struct session *s)
+int session_reopen_protocol(struct pump *pump, struct session *s)
 {
-    session_close_protocol(pump, s);
-    struct sh_err err; /* not used: session_restart reports the failure */
-    const struct loop_source *source = pump->links->source;
-    const int64_t power_ns = source->ops->last_power(source->self).t_ns, now_ns = time_of(pump, s->cursor);
+    struct sh_err err; /* not used: session_power_on reports the failure */
     const int rc = pump_protocol_create(pump, s, &err);
-    /* A head without power sends nothing by itself, so the protocol begins when power comes. */
-    if (rc == SH_OK) open_at(pump, s, power_ns > now_ns ? power_ns : now_ns);
+    if (rc == SH_OK) open_at(pump, s, time_of(pump, s->cursor));
     return rc;
 }
 
@@ -270,12 +267,16 @@ static int take_tick(struct pump *pump, struct session *s)
     if (session_waits_for_files(pump)) return 0;
     struct ring_copy tick = {.buf = pump->tick, .cap = pump->stream->tick_bytes};
     enum ring_read got = ring_read(ring, s->reader, s->cursor, &tick);
-    const uint64_t off_tick = session_off_tick(pump, s); /* after the read: it is set before its tick is released */
-    if (s->cursor >= off_tick) return 0;
+    const uint64_t power_tick = session_power_tick(pump, s); /* after the read: it is set before its tick is released */
+    if (s->cursor >= power_tick) return 0;
     if (got == RING_NONE || (got == RING_READ && tick.len > tick.cap)) return 0;
     uint64_t released = stream_released(pump->stream);
     if (got == RING_LOST && s->cursor + ring->queue_ticks < released) {
-        session_catch_up(pump, s, released, off_tick); /* the number of the next tick's frames shows a loss */
+        session_catch_up(pump, s, released, power_tick); /* the number of the next tick's frames shows a loss */
+        return 1;
+    }
+    if (s->is_off) {
+        s->cursor++;
         return 1;
     }
     if (got == RING_LOST && ops->gap != NULL) ops->gap(s->protocol, 1); /* the head could not compute it */
@@ -313,12 +314,12 @@ static int take_input(struct pump *pump, struct session *s)
 {
     struct session_commands *c = &s->commands;
     const uint32_t from = c->in_pos;
-    for (uint32_t n; !s->hang_up && (n = piece_of(pump, s)) != 0; c->in_pos += n) {
+    for (uint32_t n; !s->hang_up && !s->is_off && (n = piece_of(pump, s)) != 0; c->in_pos += n) {
         s->answering = 1;
         pump->protocol->input(s->protocol, c->in + c->in_pos, n);
         s->answering = 0;
     }
-    if (s->hang_up && c->in_pos != c->in_len) {
+    if ((s->hang_up || s->is_off) && c->in_pos != c->in_len) {
         host_count(s, PROTOCOL_INPUT_LOST, c->in_len - c->in_pos);
         c->in_pos = c->in_len;
     }
@@ -329,7 +330,7 @@ void session_read_protocol(struct pump *pump, struct session *s, int index)
 {
     struct session_commands *c = &s->commands;
     pump_read(pump, s, index);
-    if (pump->ops->datagrams) take_input(pump, s); /* before the next one comes */
+    if (pump->ops->datagrams || s->is_off) take_input(pump, s); /* before the next one comes */
     /* Input waits, and no more fits: the link rests, for the reason in pump_read_commands. */
     if (c->in_len - c->in_pos == READ_BYTES && piece_of(pump, s) == 0) c->wrong = WRONG_AT_ONCE;
 }
@@ -362,7 +363,8 @@ static int flush(struct pump *pump, struct session *s, int index)
 int session_owes_protocol(const struct pump *pump, const struct session *s)
 {
     const struct protocol_ops *ops = pump->protocol;
-    return s->commands.in_pos != s->commands.in_len || s->units.n != 0 || ops->owes == NULL || ops->owes(s->protocol);
+    return s->commands.in_pos != s->commands.in_len || s->units.n != 0 || ops->owes == NULL || s->is_off ||
+           ops->owes(s->protocol);
 }
 
 int session_write_protocol(struct pump *pump, struct session *s, int index)
@@ -392,6 +394,7 @@ int session_write_protocol(struct pump *pump, struct session *s, int index)
 
 uint64_t session_wake_tick(const struct pump *pump, const struct session *s)
 {
+    if (s->is_off) return UINT64_MAX; /* all are woken when power comes */
     if (pump->protocol->next_ns == NULL) return pump->protocol->time != NULL ? s->cursor : UINT64_MAX;
     int64_t next_ns = pump->protocol->next_ns(s->protocol);
     if (next_ns == INT64_MAX) return UINT64_MAX;

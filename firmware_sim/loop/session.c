@@ -46,7 +46,7 @@ void session_open(struct pump *pump, struct session *s, const char *peer)
     stream_set_reader(pump->stream, s->reader, stream_released(pump->stream), pump->holds);
     s->cursor = stream_released(pump->stream);
     s->power_from = s->came_at = 0;
-    s->shut = s->left = 0;
+    s->shut = s->left = s->is_off = 0;
     snprintf(s->peer, sizeof s->peer, "%.63s", peer); /* an address is shorter */
     if (native && s->out == NULL) s->out = malloc(pump->out_cap);
     struct sh_err err = {.text = "no memory for a session"};
@@ -78,13 +78,22 @@ void session_cut(struct pump *pump, struct session *s)
     if (!pump->protocol->passes_native) session_close_protocol(pump, s);
 }
 
-void session_restart(struct pump *pump, struct session *s, uint64_t tick)
+void session_power_off(struct pump *pump, struct session *s, uint64_t tick)
 {
     s->power_from = tick + 1;
     if (pump->protocol->passes_native) return;
     clear(s);
     session_gone(pump, s); /* units that still wait in the link are not sent */
-    if (session_restart_protocol(pump, s) == SH_OK) {
+    session_close_protocol(pump, s);
+    s->is_off = 1;
+}
+
+void session_power_on(struct pump *pump, struct session *s, uint64_t tick)
+{
+    if (!s->is_off) return;
+    s->is_off = 0;
+    if (s->cursor < tick) s->cursor = tick; /* in real time, a link that takes no more; these ticks went with power */
+    if (session_reopen_protocol(pump, s) == SH_OK) {
         session_know_next(pump, s);
         return;
     }
@@ -93,10 +102,11 @@ void session_restart(struct pump *pump, struct session *s, uint64_t tick)
     if (pump->ops->end != NULL) pump->ops->end(pump->link, session_index(pump, s));
 }
 
-uint64_t session_off_tick(const struct pump *pump, const struct session *s)
+uint64_t session_power_tick(const struct pump *pump, const struct session *s)
 {
     if (pump->is_clean) return UINT64_MAX;
-    return stream_off_tick(pump->stream, s->cursor > s->power_from ? s->cursor : s->power_from);
+    const uint64_t from = s->cursor > s->power_from ? s->cursor : s->power_from;
+    return s->is_off ? stream_on_tick(pump->stream, from) : stream_off_tick(pump->stream, from);
 }
 
 /* The session sends no more commands: gives its control back, once. */
@@ -113,7 +123,7 @@ static void leave(struct pump *pump, struct session *s)
 void session_close(struct pump *pump, struct session *s)
 {
     if (!s->open) return;
-    if (pump->protocol->gone != NULL) pump->protocol->gone(s->protocol);
+    if (pump->protocol->gone != NULL && !s->is_off) pump->protocol->gone(s->protocol);
     session_cut(pump, s);
     leave(pump, s);
 }
@@ -156,12 +166,12 @@ static int take_tick(struct pump *pump, struct session *s)
     struct ring_copy tick = {.buf = s->out + s->out_len, .cap = pump->out_cap - end};
     enum ring_read got = ring_read(ring, s->reader, s->cursor, &tick);
     /* After ring_read: where power goes with a tick, that is noted before the tick is released. */
-    const uint64_t off_tick = session_off_tick(pump, s);
-    if (s->cursor >= off_tick) return 0;
+    const uint64_t power_tick = session_power_tick(pump, s);
+    if (s->cursor >= power_tick) return 0;
     if (got == RING_NONE || (got == RING_READ && tick.len > tick.cap)) return 0;
     uint64_t released = stream_released(pump->stream);
     if (got == RING_LOST && s->cursor + ring->queue_ticks < released) {
-        session_catch_up(pump, s, released, off_tick);
+        session_catch_up(pump, s, released, power_tick);
         return 1;
     }
     s->cursor++;
@@ -205,7 +215,7 @@ static uint32_t write_straight(struct pump *pump, struct session *s)
     const uint32_t least = pump->ops->is_cheap ? 1 : STRAIGHT_BYTES;
     if (s->out_len != 0 || pump->ops->stalls || session_waits_for_files(pump)) return 0;
     if (ring_look(ring, s->reader, s->cursor, &tick) == RING_READ && tick.len >= least && follows(s, &tick) &&
-        s->cursor < session_off_tick(pump, s)) {
+        s->cursor < session_power_tick(pump, s)) {
         session_check_lost(pump, s, &tick, stream_released(pump->stream));
         s->cursor++;
         const ssize_t n =
@@ -285,7 +295,7 @@ int session_waits_for_files(const struct pump *pump)
 
 int session_pass(struct pump *pump, struct session *s, int is_last)
 {
-    const int ends = is_last || s->cursor >= session_off_tick(pump, s); /* a power cycle ends what came before it */
+    const int ends = is_last || s->cursor >= session_power_tick(pump, s); /* a power cycle ends what came before it */
     const int64_t t_ns = ends ? INT64_MAX : (int64_t)s->cursor * pump->stream->tick_ns;
     return faulty_pass(pump->link, session_index(pump, s), t_ns);
 }

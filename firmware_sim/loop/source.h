@@ -31,7 +31,7 @@ struct loop_source_ops {
     int64_t (*date_ns)(void *self, int64_t t_ns); /* UTC where it is known; else the time since power-up */
     int64_t (*next_fix_ns)(void *self, int64_t t_ns);
     int (*fix)(void *self, int64_t t_ns, struct nmea_fix *fix);
-    struct device_power_up (*last_power)(void *self);
+    struct device_power_up (*last_power)(void *self, int64_t t_ns);
     enum protocol_pps (*pps)(void *self, int64_t t_ns, int64_t *hour_ns);
     int (*store)(void *self, const char *name, const char *text);
     int (*stored)(const void *self, const char *name, char text[SETTINGS_FILE_TEXT]);

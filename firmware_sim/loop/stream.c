@@ -374,12 +374,23 @@ uint64_t stream_power_tick(const struct stream *stream, uint32_t i)
     return i < atomic_load(&stream->n_power) ? atomic_load(&stream->power_tick[i % STREAM_POWER_TICKS]) : UINT64_MAX;
 }
 
-uint64_t stream_off_tick(const struct stream *stream, uint64_t cursor)
+/* Changes with even numbers: power goes; with odd ones, it comes. */
+static uint64_t change_from(const struct stream *stream, uint32_t odd, uint64_t cursor)
 {
     const uint32_t n = atomic_load(&stream->n_power);
-    for (uint32_t i = n > STREAM_POWER_TICKS ? (n - STREAM_POWER_TICKS + 1) & ~1U : 0; i < n; i += 2)
+    for (uint32_t i = odd + (n > STREAM_POWER_TICKS ? (n - STREAM_POWER_TICKS + 1) & ~1U : 0); i < n; i += 2)
         if (stream_power_tick(stream, i) >= cursor) return stream_power_tick(stream, i);
     return UINT64_MAX;
+}
+
+uint64_t stream_off_tick(const struct stream *stream, uint64_t cursor)
+{
+    return change_from(stream, 0, cursor);
+}
+
+uint64_t stream_on_tick(const struct stream *stream, uint64_t cursor)
+{
+    return change_from(stream, 1, cursor);
 }
 
 uint64_t stream_grant(struct stream *stream, uint64_t ns)

@@ -167,6 +167,8 @@ void stream_say_late(struct stream *stream, uint64_t tick);
 uint64_t stream_released(const struct stream *stream);
 /* Returns the first tick from `cursor` on with which power goes; UINT64_MAX: none so far. */
 uint64_t stream_off_tick(const struct stream *stream, uint64_t cursor);
+/* The same for power that comes. */
+uint64_t stream_on_tick(const struct stream *stream, uint64_t cursor);
 /* Returns the tick of change number i of power, from 0; UINT64_MAX: there is none so far. */
 uint64_t stream_power_tick(const struct stream *stream, uint32_t i);
 /* A peer grants time. Returns the sum of all grants, ns. */

@@ -125,9 +125,9 @@ static uint64_t rests_from(void *self)
     return plays ? UINT64_MAX : tick;
 }
 
-static struct device_power_up last_power(void *self)
+static struct device_power_up last_power(void *self, int64_t t_ns)
 {
-    (void)self;
+    (void)self, (void)t_ns;
     return (struct device_power_up){.ons = 1};
 }
 

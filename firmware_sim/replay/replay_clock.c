@@ -50,7 +50,10 @@ static void take_pps(struct replay_clock *clock, int64_t t_ns, const struct nati
     if (event->a >= (uint64_t)(LAST_NS / UTC_SECOND_NS) || !is_date(shown_ns)) return;
     const int64_t second = (int64_t)event->a, ahead_s = second - (shown_ns + UTC_SECOND_NS / 2) / UTC_SECOND_NS;
     if (ahead_s != 0) add_piece(clock, t_ns, native_after_ns(utc0_ns, ahead_s * UTC_SECOND_NS));
-    if (len > end && strcmp(event->text + len - end, LEAP) == 0) utc_table_add(&clock->table, second);
+    if (len <= end || strcmp(event->text + len - end, LEAP) != 0) return;
+    /* The head's clock may be behind the receiver, for which that second is over: it would go back. */
+    if (replay_clock_receiver_ns(clock, t_ns) < second * UTC_SECOND_NS + UTC_SECOND_NS / 2)
+        utc_table_add(&clock->table, second);
 }
 
 void replay_clock_take(struct replay_clock *clock, const uint8_t *frame, int64_t shift_ns)

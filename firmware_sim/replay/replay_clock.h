@@ -8,7 +8,9 @@
  * counts at once, and not only with the next telemetry.
  *
  * The receiver's time is not in the stream. It is taken to be that of the head's clock at the first telemetry, and goes
- * on with device time. Leap seconds are those that are known, and those that PPS events show.
+ * on with device time. Leap seconds are those that are known, and those that PPS events show. Where the head's clock has
+ * fallen behind its receiver by half a second or more, its PPS event comes too late: the receiver's time has passed that
+ * leap second, and goes on without it.
  *
  * A recording may have any numbers: times wrap instead of overflowing. Pure; the caller has the lock. */
 #ifndef FIRMWARE_SIM_REPLAY_REPLAY_CLOCK_H

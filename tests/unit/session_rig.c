@@ -191,9 +191,10 @@ static enum protocol_pps give_pps(void *me, int64_t t_ns, int64_t *hour_ns)
     return PROTOCOL_PPS_ERROR;
 }
 
-static struct device_power_up last_power(void *me)
+static struct device_power_up last_power(void *me, int64_t t_ns)
 {
     assert_ptr_equal(me, &self);
+    assert_int_equal(t_ns, (int64_t)s->cursor * TICK_NS);
     return (struct device_power_up){.t_ns = 4 * TICK_NS, .ons = 3, .near_wrap = 9};
 }
 

@@ -356,7 +356,7 @@ static void reboots_by_command(void **state)
                                                .replay = replays ? journal_path : NULL};
         struct rig *rig = rig_open(&options, NULL, 0);
         rig_go_to(rig, 300);
-        assert_int_equal(device_last_power(rig->device).t_ns, 0);
+        assert_int_equal(device_last_power(rig->device, INT64_MAX).t_ns, 0);
         if (!replays) rig_tell(rig, "HEAD:PRR 100000", 300);
         if (!replays) rig_tell(rig, "SCAN:START", 300);
         rig_go_to(rig, 500);
@@ -366,7 +366,7 @@ static void reboots_by_command(void **state)
         assert_true(rig->work.power == DEVICE_POWER_GOES && rig->work.tick == 500 && !rig->work.scanning);
         assert_true(rig_claim(rig));
         assert_true(rig->work.power == DEVICE_POWER_COMES);
-        assert_int_equal(device_last_power(rig->device).t_ns, 501 * TICK_NS);
+        assert_int_equal(device_last_power(rig->device, INT64_MAX).t_ns, 501 * TICK_NS);
         assert_int_equal(next_state(rig, "idle"), 501 + BOOT_TICKS);
         assert_string_equal(rig_tell(rig, "HEAD:PRR?", rig->next), "300000");
         assert_string_equal(rig_tell(rig, "SYST:CONT?", rig->next), "0");
@@ -396,11 +396,11 @@ static void counts_from_near_the_wrap(void **state)
     struct rig *rig =
         open_with("  - {kind: counters_high, n: 40, until_s: 0.5}\n  - {kind: power_cycle, from_s: 1, for_ms: 5}\n",
                   NULL, NULL, 0);
-    assert_int_equal(device_last_power(rig->device).near_wrap, 40);
+    assert_int_equal(device_last_power(rig->device, INT64_MAX).near_wrap, 40);
     rig_go_to(rig, 1000);
-    assert_int_equal(device_last_power(rig->device).near_wrap, 40);
+    assert_int_equal(device_last_power(rig->device, INT64_MAX).near_wrap, 40);
     rig_go_to(rig, 1010);
-    assert_int_equal(device_last_power(rig->device).near_wrap, 0);
+    assert_int_equal(device_last_power(rig->device, INT64_MAX).near_wrap, 0);
     assert_string_equal(rig_tell(rig, "FAULt:INJected? 1", rig->next), "1");
     rig_close(rig);
 }

@@ -46,7 +46,7 @@ static void the_device_is_locked(void **state)
     TAKES(1, device_last_scan(d, &station));
     TAKES(1, device_scan_ns(d));
     TAKES(1, device_rests_from(d));
-    TAKES(1, (device_last_power(d), 0));
+    TAKES(1, (device_last_power(d, 0), 0));
     TAKES(1, device_window_loss_db(d));
     TAKES(1, device_date_ns(d, 0));
     TAKES(1, (device_get_time_server(d, &server), 0));

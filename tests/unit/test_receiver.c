@@ -185,6 +185,31 @@ static void a_head_without_power_hears_nothing(void **state)
     rig_close(rig);
 }
 
+/* Power is off from 1 to 1.1 s and from 1.4 to 1.7 s. A session that is late gets the same as one that is not: nothing
+ * from 1 s on, as the sentence of 0.5 s is from before that, and the next ones arrive at 1.5 s, without power, and at
+ * 2.5 s. */
+static void each_power_cycle_counts(void **state)
+{
+    (void)state;
+    static const char *const sets[] = {"faults[0].kind=power_cycle", "faults[0].from_s=1",   "faults[0].for_ms=100",
+                                       "faults[1].kind=power_cycle", "faults[1].from_s=1.4", "faults[1].for_ms=300"};
+    static const struct {
+        double t_s;
+        int second, ons;
+    } row[] = {{0.9, 3598, 1}, {1.05, -1, 1}, {1.2, -1, 2}, {1.45, -1, 2}, {1.65, -1, 2}, {1.8, -1, 3}, {2.6, 0, 3}};
+    struct rig *rig = open_with(sets, sizeof sets / sizeof *sets);
+    for (int late = 0; late < 2; late++)
+        for (size_t i = 0; i < sizeof row / sizeof *row; i++) {
+            struct nmea_fix fix;
+            assert_int_equal(second_at(rig, row[i].t_s, &fix), row[i].second);
+            assert_int_equal(device_last_power(rig->device, llround(1e9 * row[i].t_s)).ons, row[i].ons);
+        }
+    assert_int_equal(device_last_power(rig->device, SECOND_NS - 1).t_ns, 0);
+    assert_int_equal(device_last_power(rig->device, SECOND_NS).t_ns, SECOND_NS / 10 * 11);
+    assert_int_equal(device_last_power(rig->device, INT64_MAX).t_ns, SECOND_NS / 10 * 17);
+    rig_close(rig);
+}
+
 /* At the highest rate sentences are as late as can be: 5 s by the setting, and 10 s by faults that add up to 20 s. All
  * sentences under way are still there. */
 static void late_sentences_are_not_lost(void **state)
@@ -386,6 +411,7 @@ int main(void)
         cmocka_unit_test(follows_what_comes),
         cmocka_unit_test(sentences_go_wrong),
         cmocka_unit_test(a_head_without_power_hears_nothing),
+        cmocka_unit_test(each_power_cycle_counts),
         cmocka_unit_test(late_sentences_are_not_lost),
         cmocka_unit_test(late_pulses_have_their_second),
         cmocka_unit_test(the_rotor_is_where_the_lock_wants_it),

@@ -111,6 +111,24 @@ static void a_pulse_shows_a_leap_second_that_no_table_has(void **state)
     assert_true(replay_clock_receiver_ns(&the_clock, 4 * S) == (MINUTE_S + 1) * S);
 }
 
+/* The head's clock jumps back by 2 s, so its 12:34:60 comes when the receiver's second after it is over. The receiver,
+ * which showed no leap second, goes on evenly. A pulse that is late by 0.4 s still shows it. */
+static void a_receiver_does_not_go_back(void **state)
+{
+    (void)state;
+    replay_clock_begin(&the_clock, 0, (MINUTE_S - 2) * S);
+    take_pps(S, MINUTE_S - 3, "2026-03-31T12:34:57Z");
+    expect_receiver(4 * S - 1, 12, 35, 1);
+    take_pps(4 * S, MINUTE_S, "2026-03-31T12:34:60Z");
+    expect_head(4 * S, MINUTE_S * S);
+    expect_receiver(4 * S, 12, 35, 2);
+    expect_receiver(5 * S, 12, 35, 3);
+    replay_clock_begin(&the_clock, 0, (MINUTE_S - 2) * S);
+    take_pps(2 * S + S / 5 * 2, MINUTE_S, "2026-03-31T12:34:60Z");
+    expect_receiver(3 * S - 1, 12, 34, 60);
+    expect_receiver(3 * S, 12, 35, 0);
+}
+
 static void a_leap_second_that_is_known_needs_no_pulse(void **state)
 {
     (void)state;
@@ -225,6 +243,7 @@ int main(void)
         cmocka_unit_test(the_head_drifts_and_the_receiver_does_not),
         cmocka_unit_test(a_jump_counts_from_the_next_pulse_on),
         cmocka_unit_test(a_pulse_shows_a_leap_second_that_no_table_has),
+        cmocka_unit_test(a_receiver_does_not_go_back),
         cmocka_unit_test(a_leap_second_that_is_known_needs_no_pulse),
         cmocka_unit_test(a_clock_that_has_not_begun_takes_nothing),
         cmocka_unit_test(the_first_round_has_the_recorded_times),

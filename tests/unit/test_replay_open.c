@@ -261,8 +261,8 @@ static void the_loop_learns_its_sizes(void **state)
     cfg->loop.tick_hz = 1000;
     r = open_with(&plain);
     assert_int_equal(replay_source.usual_bytes(r), 4096 + 1000 * 2 * 20);
-    assert_int_equal(replay_source.last_power(r).ons, 1);
-    assert_true(replay_source.last_power(r).t_ns == 0);
+    assert_int_equal(replay_source.last_power(r, 0).ons, 1);
+    assert_true(replay_source.last_power(r, 0).t_ns == 0);
     assert_true(replay_source.scans(r) == 0);
     assert_ptr_equal(replay_source.counters(r), &r->counters);
     const struct talk_options *options = NULL;

@@ -275,23 +275,65 @@ static void a_client_joins_late(void **state)
     expect_log("create |open 12|frame 0 at 50|");
 }
 
-/* When power goes, a session that goes on begins anew at its cursor, or when power comes: nothing is sent by itself
- * before. What still waited in it is gone. */
-static void a_session_is_restarted(void **state)
+/* When power goes, the protocol of a session that goes on ends, and what still waited in it is gone. Power goes with
+ * ticks 2 and 5, and comes with 4 and 7. The new instance learns of times after 4 alone, though both power cycles are
+ * known already. */
+static void a_session_outlasts_power(void **state)
 {
     (void)state;
     open_session();
-    s->open = 1;
-    s->cursor = 6;
+    static const uint64_t ticks[] = {2, 4, 5, 7};
+    for (int i = 0; i < 4; i++)
+        stream_power(&stream, ticks[i]);
+    for (int i = 0; i < 8; i++)
+        release(0);
+    s->cursor = 2;
     say("half");
     spec.host.send(spec.host.ctx, "unit", 4);
     logged[0] = '\0';
-    session_restart(&pump, s, 7);
-    expect_log("destroy|create |open 6|");
-    s->cursor = 2; /* power comes with tick 4 */
-    session_restart(&pump, s, 7);
-    expect_log("destroy|create |open 4|");
-    assert_true(s->power_from == 8 && s->units.n == 0 && s->commands.in_len == 0 && s->open == 1);
+    session_power_off(&pump, s, 2);
+    assert_true(s->power_from == 3 && s->units.n == 0 && s->commands.in_len == 0 && s->open == 1);
+    say("lost");
+    session_write_protocol(&pump, s, 2);
+    expect_log("destroy|");
+    assert_true(s->cursor == 4 && pump.counts.lost_input_bytes == 4);
+    assert_true(session_wake_tick(&pump, s) == UINT64_MAX && session_owes_protocol(&pump, s));
+    session_power_on(&pump, s, 4);
+    expect_log("create |open 4|");
+    session_write_protocol(&pump, s, 2);
+    expect_log("5|");
+    assert_int_equal(s->cursor, 5);
+    session_power_off(&pump, s, 5);
+    session_power_on(&pump, s, 7); /* its link takes no more, and it is still at 5 */
+    expect_log("destroy|create |open 7|");
+    assert_int_equal(s->cursor, 7);
+    session_power_on(&pump, s, 7); /* it has power */
+    expect_log("");
+}
+
+/* A session that outlasts power takes no tick beyond a change of power until the link has carried that out, though later
+ * changes are known. So its log is the same however far the head is ahead. */
+static void power_changes_in_turn(void **state)
+{
+    (void)state;
+    static const char *const logs[] = {"1|2|destroy|", "create |open 4|", "5|destroy|", "create |open 7|", "8|"};
+    static const uint64_t ticks[] = {2, 4, 5, 7};
+    open_session();
+    own_link.end = NULL;
+    stream.waits = 1;
+    for (int i = 0; i < 4; i++)
+        stream_power(&stream, ticks[i]);
+    for (int i = 0; i < 8; i++)
+        release(0);
+    s->cursor = 0;
+    logged[0] = '\0';
+    for (uint32_t i = 0; i < 5; i++) {
+        session_write_protocol(&pump, s, 2);
+        assert_int_equal(s->cursor, i < 4 ? ticks[i] : 8);
+        assert_int_equal(pump_power(&pump, 0), i < 4);
+        expect_log(logs[i]);
+        assert_int_equal(pump.power_seen, i < 4 ? i + 1 : 4);
+    }
 }
 
 /* Settings that were stored are tried when the link is opened. */
@@ -344,7 +386,8 @@ int main(void)
         WITH_SESSION(it_wakes_for_its_protocol),
         WITH_SESSION(a_failing_link_ends_the_session),
         WITH_SESSION(a_client_joins_late),
-        WITH_SESSION(a_session_is_restarted),
+        WITH_SESSION(a_session_outlasts_power),
+        WITH_SESSION(power_changes_in_turn),
         WITH_SESSION(stored_settings_are_checked),
         WITH_SESSION(ticks_are_shifted_and_overtaken),
     };

@@ -21,13 +21,13 @@ static const char CONFIG[] =
     "        {type: file, protocol: nmea, path: nmea}]\n"
     "gnss: {cold: on, talker: GP}\n"
     "time: {epoch: 2026-01-01T00:59:57.5Z}\n"
-    "faults:\n"
-    "  - {kind: nmea_void, from_s: 3, until_s: 4}\n"
-    "  - {kind: nmea_checksum, from_s: 4, until_s: 5}\n"
-    "  - {kind: nmea_lost, from_s: 5, until_s: 7}\n"
-    "  - {kind: nmea_late, for_ms: 1100, from_s: 7, until_s: 8}\n"
-    "  - {kind: pps_lost, from_s: 9, until_s: 11}\n"
-    "  - {kind: pps_jitter, for_ms: 3, from_s: 13, until_s: 15}\n";
+    "faults:\n";
+static const char FAULTS[] = "  - {kind: nmea_void, from_s: 3, until_s: 4}\n"
+                             "  - {kind: nmea_checksum, from_s: 4, until_s: 5}\n"
+                             "  - {kind: nmea_lost, from_s: 5, until_s: 7}\n"
+                             "  - {kind: nmea_late, for_ms: 1100, from_s: 7, until_s: 8}\n"
+                             "  - {kind: pps_lost, from_s: 9, until_s: 11}\n"
+                             "  - {kind: pps_jitter, for_ms: 3, from_s: 13, until_s: 15}\n";
 
 /* Between these device times, a position packet says this. */
 static const struct {
@@ -138,13 +138,20 @@ static void check_receiver(const char *text)
     }
 }
 
+static const char *write_config(struct wire *wire, const char *faults)
+{
+    char text[4096];
+    snprintf(text, sizeof text, "%s%s", CONFIG, faults);
+    return wire_write_text(wire, "config.yaml", text);
+}
+
 static void test_receiver_goes_wrong(void **state)
 {
     struct wire *wire = *state;
     static const char *const more[] = {"--pace", "fast", "--duration", "15.5", NULL};
     size_t len;
     room_write(wire);
-    struct head head = head_start(wire, wire_write_text(wire, "config.yaml", CONFIG), more);
+    struct head head = head_start(wire, write_config(wire, FAULTS), more);
     head_end(&head, 0);
     char *bytes = wire_read(wire_path(wire, "position"), &len);
     check_positions((const uint8_t *)bytes, len);
@@ -157,10 +164,56 @@ static void test_receiver_goes_wrong(void **state)
     free(bytes);
 }
 
+/* Two power cycles close together, and two that make one outage. A session of a file has packets from each power-up on,
+ * with which the time begins at 0, until power goes. Sentences arrive at 0.5 s, 1.5 s and so on, and are forgotten with power. */
+static const struct outages {
+    const char *faults;
+    struct {
+        double on_s, off_s, sentence_s; /* sentence_s: the first one since power came */
+    } power[4];
+} OUTAGES[] = {{"  - {kind: power_cycle, from_s: 1, for_ms: 100}\n"
+                "  - {kind: power_cycle, from_s: 1.4, for_ms: 300}\n",
+                {{0, 1, 0.5}, {1.1, 1.4, 1.5}, {1.7, 99, 2.5}}},
+               {"  - {kind: power_cycle, from_s: 2.2, for_ms: 1400}\n"
+                "  - {kind: power_cycle, from_s: 3, for_ms: 2000}\n",
+                {{0, 2.2, 0.5}, {5, 99, 5.5}}}};
+
+static void check_outages(const struct outages *outages, const uint8_t *bytes, size_t len)
+{
+    size_t i = 0;
+    for (int k = 0; k < 4 && outages->power[k].off_s > 0; k++) {
+        const double on_s = outages->power[k].on_s, off_s = outages->power[k].off_s;
+        const int first = (int)ceil(on_s / POSITION_S);
+        for (int n = first; n * POSITION_S < off_s && (i + 1) * POSITION <= len; n++, i++) {
+            const uint8_t *packet = bytes + i * POSITION;
+            const double t_s = n * POSITION_S;
+            if (n == first) assert_true(fabs(le_get32(packet + 198) - 1e6 * (t_s - on_s)) <= 1.0); /* rounded down */
+            if ((packet[206] == '$') != (t_s >= outages->power[k].sentence_s)) fail_msg("packet %zu, %.6f s", i, t_s);
+        }
+    }
+    assert_true(i * POSITION == len && i > 150); /* 6 s less 2.8 s are 172 packets */
+}
+
+static void test_power_cycles(void **state)
+{
+    struct wire *wire = *state;
+    static const char *const more[] = {"--pace", "fast", "--duration", "6", NULL};
+    room_write(wire);
+    for (size_t k = 0; k < sizeof OUTAGES / sizeof *OUTAGES; k++) {
+        size_t len;
+        struct head head = head_start(wire, write_config(wire, OUTAGES[k].faults), more);
+        head_end(&head, 0);
+        char *bytes = wire_read(wire_path(wire, "position"), &len);
+        check_outages(&OUTAGES[k], (const uint8_t *)bytes, len);
+        free(bytes);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_receiver_goes_wrong, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_power_cycles, wire_setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
