@@ -62,7 +62,7 @@ struct scanhead;
  *   "usb", "usb:vid:pid", "usb:vid:pid:serial"   the head's own USB interface; ids in hexadecimal
  *   "tty:/dev/ttyACM0"                           a serial port or pty
  *   "tcp:host:port"
- *   "fd:N"                                       an open descriptor; the handle closes it, and keeps it from blocking
+ *   "fd:N"                                       an open descriptor, of no other handle; closed at the end
  *   PATH                                         a raw stream (.shs), or its frames as packets (.pcapng)
  * On failure *out is NULL, and err (may be NULL) gets the reason. */
 int scanhead_open(const char *source, struct scanhead **out, char *err, size_t err_len);
@@ -213,10 +213,10 @@ struct scanhead_notice {
     const char *why;  /* REFUSED: a line of text, valid until fn returns; else NULL */
 };
 
-/* fn gets each notice, from within scanhead_next, scanhead_command and scanhead_reattach, and in the order of the
- * stream: at_byte never falls. A notice comes before the frame that follows it in the stream. While a command waits for
- * its reply, frames that came earlier may still be kept for scanhead_next; REFUSED waits with them. On this handle fn
- * may only call scanhead_get_stats, which already counts the notice. NULL, as at first: no function. Counters go on. */
+/* fn gets each notice, from within scanhead_next, scanhead_command and scanhead_reattach. A notice comes before the
+ * frame that follows it in the stream. Frames that come while a command waits are kept for scanhead_next, and REFUSED
+ * waits with them; at_byte of all other notices never falls. On this handle fn may only call scanhead_get_stats, which
+ * already counts the notice. NULL, as at first: no function. Counters go on. */
 void scanhead_on_notice(struct scanhead *sh, void (*fn)(void *ctx, const struct scanhead_notice *notice), void *ctx);
 /* Returns the kind in lower case, such as "bad payload"; "?" for another number. */
 const char *scanhead_notice_name(int kind);

@@ -97,6 +97,7 @@ static void put_losses(FILE *out, const struct ply_facts *facts)
     if (s->repeated + s->late + s->restarts != 0)
         fprintf(out, "comment frames_repeated %" PRIu64 " frames_late %" PRIu64 " restarts %" PRIu64 "\n", s->repeated,
                 s->late, s->restarts);
+    if (s->refused != 0) fprintf(out, "comment frames_refused %" PRIu64 "\n", s->refused);
     fprintf(out, "comment pulses_lost %" PRIu64 " points_before_descriptor %" PRIu64 "\n", s->pulses_lost,
             facts->n_unplaced);
 }

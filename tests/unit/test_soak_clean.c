@@ -27,6 +27,13 @@ int offline_connect(const char *who, struct link_spec *link, struct scanhead **s
     return connect_rc < 0 ? sh_fail(err, connect_rc, "no pair") : connect_rc;
 }
 
+/* Every link here has a connection. */
+void soak_saw_none(struct soak_link *link, soak_seq top)
+{
+    assert_non_null(link);
+    assert_int_equal(top, soak->clean.top);
+}
+
 int scanhead_next(struct scanhead *sh, struct scanhead_frame *frame, int timeout_ms)
 {
     if (sh != handle || timeout_ms != 50) return SCANHEAD_EINPUT;

@@ -11,6 +11,8 @@
 #include "firmware_sim/app/studio/soak/clean.h"
 #include "firmware_sim/app/studio/soak/frame.h"
 #include "firmware_sim/app/studio/soak/hold.h"
+#include "firmware_sim/app/studio/soak/judge.h"
+#include "firmware_sim/app/studio/soak/ledger.h"
 #include "tests/unit/clock_rig.h"
 #include "tests/unit/soak_rig.h"
 
@@ -44,6 +46,19 @@ static int end(void **state)
     (void)state;
     soak_rig_end(soak);
     return 0;
+}
+
+/* The clean reader reads these frames, one after the other. */
+static void stream_to(uint32_t from, uint32_t to)
+{
+    for (uint32_t seq = from; seq < to; seq++) {
+        const soak_seq top = soak_seq_of(soak, seq);
+        soak->clean.ring[top % SOAK_RING] = (struct soak_clean_frame){
+            .seq = top, .digest = (uint64_t)seq << 32 | seq, .t_ns = (int64_t)seq * TICK_NS, .len = 60, .there = 1};
+        soak->clean.top = soak->base = top;
+        soak->clean.frames++;
+        assert_int_equal(soak_hold(soak), 0);
+    }
 }
 
 /* The clean reader is n frames of that many bytes ahead of the client. */
@@ -122,6 +137,30 @@ static void not_for_ever(void **state)
     assert_int_equal(soak_hold(soak), 1);
 }
 
+/* A client is away for longer than the ring of frames. Nothing of that is lost, and all before it is compared. */
+static void absences_of_any_length(void **state)
+{
+    static const uint32_t away[] = {1000, 40000, 70000, 200000};
+    (void)state;
+    for (size_t i = 0; i < 2 * sizeof away / sizeof away[0]; i++) {
+        const uint32_t from = FIRST + 100, to = from + away[i / 2];
+        soak_rig_end(soak);
+        soak = soak_rig_make();
+        soak->realtime = 0;
+        at = &soak->link[0];
+        stream_to(FIRST, from);
+        see_others(soak, FIRST, from);
+        soak_saw_end(at);
+        stream_to(from, to);
+        soak_saw_open(at);
+        if (i % 2 != 0) notice(soak, SCANHEAD_NOTICE_GAP, from, away[i / 2]);
+        stream_to(to, to + 10);
+        see_others(soak, to, to + 10);
+        soak_judge(at, 1);
+        assert_int_equal(at->lost_plain + at->unknown + at->too_far, 0);
+    }
+}
+
 /* A client that has read nothing so far is behind by all that the clean reader has. */
 static void before_its_first_frame(void **state)
 {
@@ -145,6 +184,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(by_frames_and_bytes, begin, end),
         cmocka_unit_test_setup_teardown(who_holds, begin, end),
         cmocka_unit_test_setup_teardown(not_for_ever, begin, end),
+        cmocka_unit_test_setup_teardown(absences_of_any_length, begin, end),
         cmocka_unit_test_setup_teardown(before_its_first_frame, begin, end),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -5,13 +5,13 @@
 #include "firmware_sim/app/studio/soak/clean.h"
 #include "firmware_sim/app/studio/soak/frame.h"
 #include "firmware_sim/app/studio/soak/hold.h"
+#include "firmware_sim/app/studio/soak/ledger.h"
 #include "firmware_sim/app/studio/soak/link.h"
 #include "firmware_sim/app/studio/soak/soak.h"
 #include "firmware_sim/base/clock.h"
 
 /* MOST_BYTES is half of what the library keeps, since the head's own queues come on top. PATIENCE_NS is longer than a
- * client waits for a reply (ask.c). A client that stands still for longer may wait for device time, which must go on.
- * */
+ * client waits for a reply (ask.c). A client that stands still for longer may wait for device time, which must go on. */
 enum { MOST_FRAMES = SOAK_RING / 4, MOST_BYTES = 32 << 20 };
 static const int64_t PATIENCE_NS = 6000000000, STEP_NS = 1000000;
 
@@ -44,9 +44,20 @@ static int must_wait(struct soak *soak, struct soak_link *link)
     return now_ns - link->held_from_ns < PATIENCE_NS;
 }
 
+static soak_seq clean_top(struct soak *soak)
+{
+    pthread_mutex_lock(&soak->clean.lock);
+    const soak_seq top = soak->clean.top;
+    pthread_mutex_unlock(&soak->clean.lock);
+    return top;
+}
+
 int soak_hold(struct soak *soak)
 {
+    const soak_seq top = clean_top(soak);
     int waits = 0;
+    for (uint32_t i = 0; i < soak->n_links; i++)
+        if (soak->link[i].usable && soak->link[i].datagrams == NULL) soak_saw_none(&soak->link[i], top);
     if (soak->realtime || atomic_load(&soak->phase) == SOAK_ENDS) return 0;
     for (uint32_t i = 0; i < soak->n_links; i++)
         waits |= soak->link[i].usable && must_wait(soak, &soak->link[i]);

@@ -6,7 +6,8 @@
 struct soak;
 
 /* Waits for a millisecond and returns 1 where the clean reader must not read on, since a client is far behind it. The
- * head waits for the clean reader, and so does the stream. To be called by the clean reader's thread. */
+ * head waits for the clean reader, and so does the stream. Links without a connection go on with the clean reader. To be
+ * called by the clean reader's thread for each frame. */
 int soak_hold(struct soak *soak);
 
 #endif

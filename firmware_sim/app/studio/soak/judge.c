@@ -234,9 +234,8 @@ static void judge_frame(struct soak_link *link, const struct soak_fact *f)
 void soak_judge(struct soak_link *link, int all)
 {
     if (link->judged == 0) return;
-    for (; link->judged <= link->top; link->judged++) {
+    for (; all ? link->judged <= link->top : link->judged + SOAK_RING / 2 <= link->reached; link->judged++) {
         const struct soak_fact *f = soak_fact_at(link, link->judged);
-        if (!all && link->judged + SOAK_RING / 2 > link->reached) return;
         if (f != NULL)
             judge_frame(link, f);
         else if (link->begun && link->judged >= link->first && link->judged < link->last)

@@ -36,6 +36,14 @@ static void reach(struct soak_link *link, soak_seq seq)
     soak_judge(link, 0);
 }
 
+/* An absence may be longer than the ring. What came before it is judged while the clean reader still has it. */
+void soak_saw_none(struct soak_link *link, soak_seq top)
+{
+    pthread_mutex_lock(&link->lock);
+    if (link->begun && !link->is_open) reach(link, top);
+    pthread_mutex_unlock(&link->lock);
+}
+
 /* The frame's entry, a new one where there is none. NULL: it was judged already, or the client is too far behind it.
  * The board and the library may report frames that the client has still to read. So in a session only the frames that
  * the client reads move `reached`. */

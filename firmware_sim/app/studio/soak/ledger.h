@@ -56,6 +56,7 @@ void soak_saw_notice(void *link, const struct scanhead_notice *notice);
 void soak_saw_open(struct soak_link *link);                           /* a connection began */
 void soak_saw_end(struct soak_link *link);                            /* it ended */
 void soak_saw_no_open(struct soak_link *link);                        /* an attempt to connect failed */
+void soak_saw_none(struct soak_link *link, soak_seq top);             /* the stream is at top, without a connection */
 struct soak_fact *soak_fact_at(struct soak_link *link, soak_seq seq); /* NULL: not known */
 
 #endif

@@ -181,14 +181,18 @@ static void look_for_losses(struct viewed_stream *s, struct scanhead *sh)
     struct viewed *v = s->v;
     const struct track_missing *m = &s->track.missing;
     const struct recording_counts *c = &s->counts;
+    char refused[80] = "";
     scanhead_get_stats(sh, &stats);
+    if (stats.refused != 0)
+        snprintf(refused, sizeof refused, ", %llu frames left out for their contents or version",
+                 (unsigned long long)stats.refused);
     v->n_left_out = m->n_unplaced + m->n_without_pose + m->n_nowhere;
     v->complete =
         !c->within && c->scans > 0 && c->lost == 0 && c->missing == 0 && c->unknown == 0 && !frames_lost(&stats);
     if (!v->complete)
-        sh_warn(s->report, "%s: not complete: %llu pulses lost by the head, %s%llu did not arrive, %llu bad bytes%s",
+        sh_warn(s->report, "%s: not complete: %llu pulses lost by the head, %s%llu did not arrive, %llu bad bytes%s%s",
                 v->path, (unsigned long long)c->lost, c->unknown != 0 ? "at least " : "",
-                (unsigned long long)c->missing, (unsigned long long)stats.bad_bytes,
+                (unsigned long long)c->missing, (unsigned long long)stats.bad_bytes, refused,
                 c->within || c->scans == 0 ? "; it ends in the middle of a scan" : "");
 }
 
