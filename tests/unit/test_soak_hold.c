@@ -55,7 +55,8 @@ static void stream_to(uint32_t from, uint32_t to)
         const soak_seq top = soak_seq_of(soak, seq);
         soak->clean.ring[top % SOAK_RING] = (struct soak_clean_frame){
             .seq = top, .digest = (uint64_t)seq << 32 | seq, .t_ns = (int64_t)seq * TICK_NS, .len = 60, .there = 1};
-        soak->clean.top = soak->base = top;
+        soak->clean.top = top;
+        atomic_store(&soak->base, top);
         soak->clean.frames++;
         assert_int_equal(soak_hold(soak), 0);
     }
