@@ -392,7 +392,7 @@ void app_set_help(void (*print)(const struct app_command *command))
     help_printer = print != NULL ? print : print_help;
 }
 
-/* ---- parsing */
+/* ---- the command line as a whole */
 
 /* Counts all operands, and keeps only as many as an error message shows. */
 static void count_operand(char *words[APP_MAX_OPERANDS + 1], int *n, char *word)

@@ -68,6 +68,7 @@ static void test_all(void **state)
                                           .repeated = 5,
                                           .late = 6,
                                           .restarts = 7,
+                                          .refused = 9,
                                           .pulses_lost = 8};
     expect(
         FRONT("ascii", "scene frame, metres", "0") METRES
@@ -82,6 +83,7 @@ static void test_all(void **state)
         "comment empty_shots kept\n"
         "comment frames_lost 1 reader_lost 2 dropped 3 bad_payload 4\n"
         "comment frames_repeated 5 frames_late 6 restarts 7\n"
+        "comment frames_refused 9\n"
         "comment pulses_lost 8 points_before_descriptor 11\n"
         "element vertex 5000000000\n"
         "property double x\nproperty double y\nproperty double z\nproperty double range\nproperty float reflectance\n"

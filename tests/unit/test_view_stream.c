@@ -126,6 +126,23 @@ static void each_point_has_its_columns(void **state)
     viewed_free(&shown);
 }
 
+/* A frame of a later version is passed over. The line of what is missing names it, since nothing else does. */
+static void frames_left_out_are_told(void **state)
+{
+    (void)state;
+    uint8_t out[256];
+    const struct native_event end = {.code = NATIVE_EV_SCAN_END, .a = 1, .b = 6};
+    begin_geo(NATIVE_CRS_UTM, 32632, 3);
+    write_two_lines();
+    const size_t len = native_encode_event(out, sizeof out, &end, 0, 0);
+    out[2] = 9;
+    rig_put(out, len);
+    loads();
+    assert_int_equal(shown.complete, 0);
+    assert_non_null(strstr(rig_notes, ", 0 bad bytes, 1 frames left out for their contents or version; it ends"));
+    viewed_free(&shown);
+}
+
 /* Frame 5 was lost. It may have been points, and the telemetry with the final counts did not come, either. */
 static void a_gap_before_the_end_leaves_counts_unknown(void **state)
 {
@@ -342,6 +359,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(each_point_has_its_columns),
+        cmocka_unit_test(frames_left_out_are_told),
         cmocka_unit_test(a_gap_before_the_end_leaves_counts_unknown),
         cmocka_unit_test(stations_have_their_places),
         cmocka_unit_test(a_grid_is_a_mesh),
