@@ -14,7 +14,6 @@ struct posted {
     char *text;      /* of an error */
     int apply;       /* 0: the form is only checked */
     const char *key; /* whose value is at hand */
-    int laser_on;    /* the form has laser=on */
 };
 
 static int refuse(const struct posted *p, int status, const char *why)
@@ -108,8 +107,6 @@ static int set_rpm(const struct posted *p, const char *value)
     long rpm;
     if (!read_number(value, &rpm) || (rpm != 0 && (rpm < 300 || rpm > 1200)))
         return refuse(p, 400, "rpm: allowed are whole numbers from 300 to 1200, and 0: the motor stops");
-    if (rpm == 0 && p->laser_on)
-        return refuse(p, 400, "rpm=0 and laser=on: allowed is one of them; nothing has changed");
     if (rpm == 0) return is_scanning(p->spec) ? command(p, "SCAN:STOP") : 200;
     const long uhz = (rpm * 1000000 + 30) / 60;
     snprintf(line, sizeof line, "HEAD:LINES %ld.%06ld", uhz / 1000000, uhz % 1000000);
@@ -314,6 +311,18 @@ static size_t unify(const char *path, char *form, size_t len)
     return len;
 }
 
+/* The laser needs the motor. So no order of the two in one form has a meaning. */
+static int stops_and_starts(const struct pair *pairs, int n)
+{
+    int stops = 0, starts = 0;
+    long rpm;
+    for (int i = 0; i < n; i++) {
+        stops |= pairs[i].setting->set == set_rpm && read_number(pairs[i].value, &rpm) && rpm == 0;
+        starts |= pairs[i].setting->set == set_laser && strcasecmp(pairs[i].value, "on") == 0;
+    }
+    return stops && starts;
+}
+
 int velodyne_post(const struct protocol_spec *spec, const char *path, const char *form, size_t len, char *text)
 {
     struct pair pairs[N_SETTINGS + 1];
@@ -322,8 +331,8 @@ int velodyne_post(const struct protocol_spec *spec, const char *path, const char
     memcpy(copy, form, len);
     const int n = read_form(&posted, path, copy, unify(path, copy, len), pairs);
     int status = n < 0 ? -n : 200;
-    for (int i = 0; i < n; i++)
-        posted.laser_on |= pairs[i].setting->set == set_laser && strcasecmp(pairs[i].value, "on") == 0;
+    if (stops_and_starts(pairs, n))
+        status = refuse(&posted, 400, "rpm=0 and laser=on: allowed is one of them; nothing has changed");
     for (; posted.apply < 2; posted.apply++)
         for (int i = 0; i < n && status == 200; i++) {
             posted.key = pairs[i].setting->key;

@@ -35,7 +35,7 @@ struct device_live {
     uint64_t said_tick; /* tick of the last event about late poses */
 };
 
-enum { DEVICE_MAX_CHANGES = 32, DEVICE_MAX_POWER_UPS = 32, DEVICE_SURFACES_A_FRAME = 64 };
+enum { DEVICE_MAX_CHANGES = 32, DEVICE_MAX_POWER_UPS = 64, DEVICE_SURFACES_A_FRAME = 64 };
 
 /* The state machine of the head. */
 struct device_machine {

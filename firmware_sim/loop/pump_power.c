@@ -4,8 +4,8 @@
  *
  * All frames before the tick with which power goes are written, if the client reads fast enough; in the paces that wait
  * for readers, in any case. Bytes that the client's system has not taken by then may be lost with the connection. A
- * link without a connection, such as a file or UDP, goes on where it was; a protocol that is not native is silent until
- * power comes, and begins anew then. With `loop.pace: step`, links come back at once, since their clients let time
+ * link that no cable and no connection can end, such as a file, goes on where it was; a protocol that is not native is
+ * silent until power comes, and begins anew then. With `loop.pace: step`, links come back at once, since their clients let time
  * pass. */
 #include "firmware_sim/loop/pump_inside.h"
 

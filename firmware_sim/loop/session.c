@@ -86,12 +86,14 @@ void session_power_off(struct pump *pump, struct session *s, uint64_t tick)
     session_gone(pump, s); /* units that still wait in the link are not sent */
     session_close_protocol(pump, s);
     s->is_off = 1;
+    s->moved_ns = clock_now_ns(); /* the link has forgotten when it last moved, and at the run's end it is waited for */
 }
 
 void session_power_on(struct pump *pump, struct session *s, uint64_t tick)
 {
     if (!s->is_off) return;
     s->is_off = 0;
+    s->moved_ns = clock_now_ns();
     if (s->cursor < tick) s->cursor = tick; /* in real time, a link that takes no more; these ticks went with power */
     if (session_reopen_protocol(pump, s) == SH_OK) {
         session_know_next(pump, s);

@@ -291,7 +291,9 @@ static void a_session_outlasts_power(void **state)
     say("half");
     spec.host.send(spec.host.ctx, "unit", 4);
     logged[0] = '\0';
+    s->moved_ns = 0;
     session_power_off(&pump, s, 2);
+    assert_true(s->moved_ns > 0); /* else the end of a run would not wait for the rest */
     assert_true(s->power_from == 3 && s->units.n == 0 && s->commands.in_len == 0 && s->open == 1);
     say("lost");
     session_write_protocol(&pump, s, 2);

@@ -83,7 +83,8 @@ static void test_settings(void **state)
         {"/cgi/setting", "colour=red", 400, NULL},
         {"/cgi/setting", "rpm=600&rpm=600", 400, NULL},
         {"/cgi/setting", "rpm=600&laser=maybe", 400, NULL}, /* nothing of it is done */
-        {"/cgi/setting", "rpm=0&laser=on", 400, NULL},      /* the laser needs the motor; nothing of it is done */
+        {"/cgi/setting", "laser=on&rpm=0", 400, NULL},
+        {"/cgi/setting", "rpm=0&laser=on", 400, NULL}, /* the laser needs the motor; nothing of it is done */
         {"/cgi/setting", "laser=ON&rpm=00", 400, NULL},
         {"/cgi/setting", "rpm", 400, NULL},
         {"/cgi/setting", "", 400, NULL},

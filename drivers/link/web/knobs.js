@@ -247,7 +247,7 @@ export class Knobs extends EventTarget {
       knob.value = asSent(text); // until the head says it, for Escape
     } catch (error) {
       this.#refuse(knob, why(error));
-      if (knob.field.value !== text) knob.shown = null; // the user has typed on, and may come back to this text
+      if (knob.shown === text && knob.field.value !== text) knob.shown = null; // the user may come back to this text
       this.#take(knob, knob.value);
     }
     delete knob.box.dataset.waiting;

@@ -44,17 +44,9 @@ static int must_wait(struct soak *soak, struct soak_link *link)
     return now_ns - link->held_from_ns < PATIENCE_NS;
 }
 
-static soak_seq clean_top(struct soak *soak)
-{
-    pthread_mutex_lock(&soak->clean.lock);
-    const soak_seq top = soak->clean.top;
-    pthread_mutex_unlock(&soak->clean.lock);
-    return top;
-}
-
 int soak_hold(struct soak *soak)
 {
-    const soak_seq top = clean_top(soak);
+    const soak_seq top = soak_clean_top(soak);
     int waits = 0;
     for (uint32_t i = 0; i < soak->n_links; i++)
         if (soak->link[i].usable && soak->link[i].datagrams == NULL) soak_saw_none(&soak->link[i], top);
