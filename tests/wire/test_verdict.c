@@ -50,7 +50,8 @@ static const char *in_folder(const struct wire *wire, const char *name, const ch
 }
 
 /* A right client needs none of its limits, which are far beyond the time of a busy machine. Where the fault is that
- * nothing happens, the whole limit is waited for. */
+ * nothing happens, the whole limit is waited for. The same limit holds for the client's first connection, so it has to
+ * be longer than a client takes to start. */
 struct planted {
     const char *faults, *findings, *limit_s, *grace_s;
 };
@@ -147,13 +148,13 @@ static void expect(struct wire *wire, pid_t pid, const char *name, const char *f
 static const struct planted PLANTED[] = {
     {"none", "", "60", "60"},
     {"c", "points-known", "60", "60"},
-    {"s", "comes-back", "3", "60"},
+    {"s", "comes-back", "5", "60"},
     {"t", "points-once", "60", "60"},
-    {"cst", "comes-back points-known points-once", "3", "60"},
+    {"cst", "comes-back points-known points-once", "5", "60"},
 };
 static const struct planted OTHERS[] = {
-    {"h", "lets-go", "3", "60"}, {"a", "asks-right", "60", "60"},       {"d", "lives", "60", "60"},
-    {"k", "ends", "60", "0.5"},  {"n", "scans points-read", "3", "60"},
+    {"h", "lets-go", "5", "60"}, {"a", "asks-right", "60", "60"},       {"d", "lives", "60", "60"},
+    {"k", "ends", "60", "0.5"},  {"n", "scans points-read", "5", "60"},
 };
 enum { N_CASES = 5 };
 
