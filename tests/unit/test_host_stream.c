@@ -144,8 +144,8 @@ static void test_alike(void **state)
     }
 }
 
-/* What the stream has said is void for a new sequence: with the last frame's own number, after a frame that came twice,
- * or after copies that don't lead up to it. */
+/* A new sequence voids what the stream said before. It may begin with the last frame's own number, after a frame that
+ * came twice, or after copies that don't lead up to it. */
 static void test_void_after_restart(void **state)
 {
     (void)state;

@@ -33,7 +33,7 @@ struct soak_link {
     struct soak_row row[SOAK_N_ROWS];
     struct soak_fact *fact;
     int begun, in_session;
-    int is_open;                       /* a connection is there, be it without a frame so far */
+    int is_open;                       /* a connection is there, perhaps without a frame so far */
     soak_seq judged, first, last, top; /* next to be judged; first and last that were received; newest with an entry */
     soak_seq reached;     /* the client has read up to here, or it had no session until then; 0: not known so far */
     uint64_t too_far;     /* reports of frames that the client was too far behind */
