@@ -362,7 +362,7 @@ repair: deps-build
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test all $(BUILD)/test/tests/wire/test_repair
 	@TEST_LIMIT_S=7200 REPAIR_N=$(N) $(RUN) $(BUILD)/test/tests/wire/test_repair
 
-# This reads 600 broken meshes, with and without sanitizers, in half a minute. `make test` tries every tenth with them.
+# This reads 600 broken meshes, with and without sanitizers, in half a minute. `make test` tries one in 30 with them.
 #? test-hostile      600 broken meshes
 test-hostile: deps
 	@$(MAKE) --no-print-directory -j2 $(STRICT) BUILD=$(BUILD)/test $(BUILD)/test/tests/unit/test_hostile_files

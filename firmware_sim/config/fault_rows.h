@@ -35,7 +35,7 @@
      .help = "Largest number of times; 0: no limit. It counts in each session. At connections, and for disconnect, "
              "unplug, cable, usb_reset, endpoint_stall and short_packets, it counts on the link."},
     {FAULT(from_pulse), CFG_COUNT, NULL, "0", 0, 1e17,
-     .help = "From this pulse of a scan on, counted from 0. Then only frames of points are hit."},
+     .help = "From this pulse of a scan on, counted from 0. A fault of frames then hits only frames of points."},
     {FAULT(until_pulse), CFG_COUNT, NULL, "", 0, 1e17, .example = "1000000",
      .help = "Up to this pulse of a scan, included; when not given, without end."},
     {FAULT(from_s), CFG_REAL, "s", "0", 0, 1e8,

@@ -24,7 +24,7 @@ struct fault_note {
     uint64_t pulse; /* first of the frame, or the one that a fault of the head begins with */
     int64_t byte;   /* offset in the frame; -1: none */
     uint32_t bit;   /* of that byte, the first that a flip changed; 0 is the one of value 1 */
-    uint64_t n;     /* bytes, bits, copies, frames: as the kind has it */
+    uint64_t n;     /* bytes, bits, copies, frames, or changes at the end: as the kind has it */
     double for_ms;
     int ended;     /* a fault of the head is over */
     char text[64]; /* anything more, plain ASCII without quotes; empty: nothing */

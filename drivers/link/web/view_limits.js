@@ -83,8 +83,8 @@ export class Scale {
   }
 }
 
-// Returns {min, max} in the scene frame, without stray points: a single one, far away, would make all others small. 1 %
-// of the points at an end is left out, where the last of them lies further out than the box without them is wide.
+// Returns {min, max} in the scene frame, without stray points: a single one, far away, would make all others small. The
+// outermost 1 % at an end is left out if its last point lies further out of the others' box than its diagonal is long.
 function boxWithoutStray({blocks, bounds, origin}) {
   const axes = [[], [], []];
   for (const block of blocks) for (const i of spreadOver(block, 1000)) axes.forEach((v, a) => v.push(block.position[3 * i + a]));
