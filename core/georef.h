@@ -109,7 +109,7 @@ void georef_convergence(const struct georef *georef, double *convergence_rad, do
 int georef_rotation(const struct georef *georef, double rotation[9]);
 
 /* Differences in prcs at the centre -> axes of the CRS (geodetic: east, north, up), row by row: the map's
- * rotation there, without its scale. The unit matrix at a pole in geodetic output. */
+ * rotation there, without its scale. */
 void georef_axes(const struct georef *georef, double rotation[9]);
 
 /* Sets what georef_forward uses. SH_EINPUT: GEOREF_AUTO, or an order that has no polynomial here. To be

@@ -46,8 +46,9 @@ earth="scene.anchor.source=explicit scene.anchor.lat_deg=52.3 scene.anchor.lon_d
 record polar still output.attributes=on output.colour=height signal.model=on waveform.send=on waveform.echoes=fraction noise.range=off
 record moving ride
 record beams beams
+record track ride output.layout=geo
 # shellcheck disable=SC2086
 for crs in ecef utm geodetic; do record $crs still output.layout=geo output.crs=$crs $earth; done
-python3 tests/unit/page_points.py "$work"/{polar,moving,beams,ecef,utm,geodetic}
+python3 tests/unit/page_points.py "$work"/{polar,moving,beams,track,ecef,utm,geodetic}
 python3 tests/unit/page_hurt.py "$work/hurt"
 node tests/unit/page_native.mjs "$work"

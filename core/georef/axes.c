@@ -9,26 +9,34 @@
  * map. */
 static const double STEP_M = 100.0;
 
-/* Column k of the Jacobian is the image of a metre along axis k. */
+/* Takes a difference from the anchor in degrees, degrees and metres to a place in ECEF. */
+static void take_to_ecef(const double anchor[3], const double d[3], double p_ecef[3])
+{
+    double unused[9];
+    shim_ecef(anchor[0] + d[0], anchor[1] + d[1], anchor[2] + d[2], p_ecef, unused);
+}
+
+/* Column k of the Jacobian is the image of a metre along axis k. Degrees have no even steps near a pole. ECEF has them
+ * everywhere: there the difference is turned to east, north and up at the anchor. */
 static void jacobian(const struct georef *georef, double j[9])
 {
-    double lat_m, lon_m, axis_m, out[2][3];
+    double at_m[3], enu[9];
+    const int in_degrees = georef->crs == GEOREF_GEODETIC;
+    if (in_degrees) shim_ecef(georef->anchor[0], georef->anchor[1], georef->anchor[2], at_m, enu);
     for (int k = 0; k < 3; k++) {
+        double out[2][3], step[3];
         for (int side = 0; side < 2; side++) {
             double d[3] = {0.0, 0.0, 0.0};
             d[k] = side == 0 ? -STEP_M : STEP_M;
             shim_map_forward(georef->map, 1, (struct vec3_in){&d[0], &d[1], &d[2]},
                              (struct vec3_out){&out[side][0], &out[side][1], &out[side][2]});
+            if (in_degrees) take_to_ecef(georef->anchor, out[side], out[side]);
         }
         for (int i = 0; i < 3; i++)
-            j[3 * i + k] = (out[1][i] - out[0][i]) / (2.0 * STEP_M);
-    }
-    if (georef->crs != GEOREF_GEODETIC) return;
-    georef_degrees(georef, 0.0, &lat_m, &lon_m, &axis_m);
-    for (int k = 0; k < 3; k++) { /* latitude, longitude -> east, north */
-        double north = j[k] * lat_m;
-        j[k] = j[3 + k] * lon_m;
-        j[3 + k] = north;
+            step[i] = (out[1][i] - out[0][i]) / (2.0 * STEP_M);
+        if (in_degrees) mat3_apply_transposed(enu, (const double[3]){step[0], step[1], step[2]}, step);
+        for (int i = 0; i < 3; i++)
+            j[3 * i + k] = step[i];
     }
 }
 

@@ -16,8 +16,8 @@ static double chord_rate(const struct trajectory *tr, size_t i, int axis)
 
 static int stands(const struct trajectory *tr, size_t i)
 {
-    return memcmp(tr->sample[i].pose.position_m, tr->sample[i + 1].pose.position_m,
-                  sizeof tr->sample[i].pose.position_m) == 0;
+    const double *a = tr->sample[i].pose.position_m, *b = tr->sample[i + 1].pose.position_m;
+    return a[0] == b[0] && a[1] == b[1] && a[2] == b[2]; /* a file may say -0 for 0 */
 }
 
 /* Derivative at sample i of the parabola through it and its neighbours (at an end: through the nearest three). With two

@@ -13,11 +13,12 @@ void cola_way_add(struct cola_way *w, uint32_t scan, const uint8_t *payload, siz
     if (native_decode_poses(payload, len, &n) != 0) return;
     native_decode_pose(payload, n - 1, &p);
     if (scan != w->scan || p.t_ns < w->t1_ns) *w = (struct cola_way){.scan = scan};
+    const int has_newer = p.t_ns > w->t1_ns; /* neighbouring frames have some poses in common, or all */
     for (uint32_t i = 0; i < n; i++) {
         native_decode_pose(payload, i, &p);
         const double *a = w->at_m, *b = p.position_m;
         if (!w->have_pose) w->t0_ns = w->t1_ns = p.t_ns;
-        if (i == 0 && w->have_pose) {
+        if (i == 0 && w->have_pose && has_newer) {
             w->t0_ns = w->t1_ns;
             w->path0_m = w->path1_m;
         }

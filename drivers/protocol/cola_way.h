@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The encoder of a vehicle that carries the head: poses go in, path length and speed come out. The speed is taken as
- * constant from one stream frame of poses to the next. Times are since the scan's start, ns. Pure. */
+ * constant from one stream frame with newer poses to the next. Times are since the scan's start, ns. Pure. */
 #ifndef DRIVERS_PROTOCOL_COLA_WAY_H
 #define DRIVERS_PROTOCOL_COLA_WAY_H
 

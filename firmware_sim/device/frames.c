@@ -118,7 +118,7 @@ void device_fill_anchor(const struct site *site, uint32_t station, size_t stretc
     a->frame = s->frame;
     memcpy(a->scale, scale, sizeof a->scale);
     georef_axes(georef, a->axes);
-    if (s->on_stretch != NULL && site->stretch[stretch].until_ns != INT64_MAX)
-        a->until_ms = (uint32_t)(site->stretch[stretch].until_ns / 1000000);
+    const int64_t until_ms = s->on_stretch != NULL ? site->stretch[stretch].until_ns / 1000000 : INT64_MAX;
+    if (until_ms <= UINT32_MAX) a->until_ms = (uint32_t)until_ms; /* later than 49 days: the next anchor ends it */
     a->heights = georef_has_geoid(georef) ? NATIVE_HEIGHTS_GEOID : NATIVE_HEIGHTS_ELLIPSOID;
 }

@@ -328,6 +328,28 @@ static void a_way_ends_with_its_poses(void **state)
     expect_way(&way, 4, S, 13000, 13000);
 }
 
+/* A head gives each tick the poses around it: most frames repeat the poses of the frame before. */
+static void repeated_poses_change_no_way(void **state)
+{
+    (void)state;
+    static const int64_t S = 1000000000;
+    const struct native_pose pose[4] = {{0, {0, 0, 0}, {1, 0, 0, 0}, 0, 0, 0},
+                                        {S, {10, 0, 0}, {1, 0, 0, 0}, 0, 0, 0},
+                                        {2 * S, {20, 0, 0}, {1, 0, 0, 0}, 0, 0, 0},
+                                        {3 * S, {30, 0, 0}, {1, 0, 0, 0}, 0, 0, 0}};
+    struct cola_way way = {0};
+    for (int i = 0; i < 3; i++) {
+        add_way(&way, 1, pose, 2);
+        expect_way(&way, 1, S / 4, 2500, 10000); /* 10 m/s all the way */
+    }
+    for (int i = 0; i < 3; i++) {
+        add_way(&way, 1, &pose[1], 3);
+        expect_way(&way, 1, 5 * S / 2, 25000, 10000);
+    }
+    add_way(&way, 1, &pose[2], 2);
+    expect_way(&way, 1, 5 * S / 2, 25000, 10000);
+}
+
 /* A frame of poses has one speed: its way, from the end of the frame before it, over its time. */
 static void a_way_has_one_speed_a_frame(void **state)
 {
@@ -383,7 +405,8 @@ int main(void)
         CASE(far_heads_count_in_two_millimetres), CASE(echoes_go_to_their_channels),
         CASE(signals_end_where_their_scale_ends), CASE(name_and_time_where_asked_for),
         CASE(the_encoder_counts_the_way),         CASE(a_way_ends_with_its_poses),
-        CASE(a_way_has_one_speed_a_frame),        CASE(the_longest_telegram_has_room),
+        CASE(repeated_poses_change_no_way),       CASE(a_way_has_one_speed_a_frame),
+        CASE(the_longest_telegram_has_room),
     };
     return cmocka_run_group_tests_name("cola scan", tests, NULL, NULL);
 }

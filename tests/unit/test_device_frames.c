@@ -191,6 +191,29 @@ static void an_anchor_says_whether_the_head_moves(void **state)
     assert_true(a.moving == NATIVE_STOP && a.station == 2 && a.frame == 15 && a.station_m[0] == 5);
 }
 
+/* A path of 4 km has stretches of 2 km. The first one ends when half of the path's time is over: after 25 days, which
+ * fit in 32 bits, or after 99, which don't. */
+static void an_anchor_says_how_long_it_counts(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *end_s;
+        int fits;
+    } row[] = {{"4294967", 1}, {"17179870", 0}};
+    for (size_t i = 0; i < sizeof row / sizeof row[0]; i++) {
+        struct native_anchor a;
+        char path[128];
+        snprintf(path, sizeof path, "t_s,x_m,y_m,z_m,heading_deg\n0,-1000,0,2,0\n%s,3000,0,2,0\n", row[i].end_s);
+        write_in("path.csv", path);
+        plan("profile: sick-lms111", STATION "platform: {kind: trajectory, file: path.csv}\noutput: {layout: geo}\n");
+        assert_true(site->n_stretches > 1);
+        const int64_t until_ms = site->stretch[0].until_ns / 1000000;
+        assert_int_equal(until_ms <= UINT32_MAX, row[i].fits);
+        device_fill_anchor(site, 0, 0, &a);
+        assert_int_equal(a.until_ms, row[i].fits ? until_ms : 0);
+    }
+}
+
 static int tear_down(void **state)
 {
     site_free(site);
@@ -205,6 +228,7 @@ int main(void)
         cmocka_unit_test(an_emitter_has_its_pattern),
         cmocka_unit_test(an_anchor_says_where_its_station_stands),
         cmocka_unit_test(an_anchor_says_whether_the_head_moves),
+        cmocka_unit_test(an_anchor_says_how_long_it_counts),
     };
     return cmocka_run_group_tests_name("device frames", tests, site_rig_setup, tear_down);
 }

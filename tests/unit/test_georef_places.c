@@ -209,6 +209,16 @@ static void test_degrees(void **state)
     for (int i = 0; i < 9; i++)
         expect_near(axes[i], spec.rotation[i], 1e-8);
     georef_free(georef);
+    /* at a pole and 11 m from one, where degrees of longitude are short or nothing */
+    static const double lat_deg[] = {89.9999, -89.9999, 90, -90};
+    for (size_t k = 0; k < sizeof lat_deg / sizeof lat_deg[0]; k++) {
+        spec.lat_deg = lat_deg[k];
+        if (georef_create(&spec, &georef, &err) != SH_OK) fail_msg("%s", err.text);
+        georef_axes(georef, axes);
+        for (int i = 0; i < 9; i++)
+            expect_near(axes[i], spec.rotation[i], 1e-8);
+        georef_free(georef);
+    }
 }
 
 /* Order 5 is for maps that do not change heights. */

@@ -111,6 +111,11 @@ static void test_pause(void **state)
     trajectory_at(tr, 1.0 - 1e-3, &pose, &frame); /* at rest: off by a few times (1 - t)^2 */
     assert_true(fabs(pose.position_m[0] - 1.0) < 5e-6);
     trajectory_free(tr);
+    static const double zero_m[] = {0.0, -0.0, 4.0}; /* -0 is the same place as 0 */
+    tr = along_x(t_s, zero_m, 3);
+    trajectory_at(tr, 0.5, &pose, &frame);
+    assert_true(pose.position_m[0] == 0.0);
+    trajectory_free(tr);
 }
 
 static void test_straight_line(void **state)

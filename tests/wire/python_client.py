@@ -130,18 +130,14 @@ def by_the_page(anchor, at):
 
 def crs(polar, geo):
     (anchor, ours), (_, truth) = columns_of(polar), columns_of(geo)
-    unit = (1, 1, 1)
-    if anchor["crs"] == scanhead.CRS_GEODETIC:
-        unit = 111320, 111320 * math.cos(math.radians(anchor["lat_deg"])), 1
+    is_geodetic = anchor["crs"] == scanhead.CRS_GEODETIC
     worst, n = [0.0, 0.0, 0.0], 0
     for a, b in zip(ours, truth):
         if math.isnan(a[0]) or math.isnan(b[0]):
             assert math.isnan(a[0]) and math.isnan(b[0])
             continue
-        turn = 360 if anchor["crs"] == scanhead.CRS_GEODETIC else math.inf
-        d = [p - q for p, q in zip(a, b)]
-        d[1] = math.remainder(d[1], turn)
-        worst[0] = max(worst[0], math.hypot(*(u * v for u, v in zip(unit, d))))
+        at = [scanhead.geodetic_to_ecef(*p[:3]) if is_geodetic else p[:3] for p in (a, b)]
+        worst[0] = max(worst[0], math.dist(*at))
         worst[1] = max(worst[1], math.dist(a[3:], b[3:]))
         if anchor["crs"] == scanhead.CRS_UTM:
             worst[2] = max(worst[2], math.dist(by_the_page(anchor, a[3:]), b[:3]))

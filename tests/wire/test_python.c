@@ -195,6 +195,10 @@ static void test_both_layouts(void **state)
         "output.crs=utm" AT(83.9, 3.1, 2800),
         "output.crs=utm" AT(88, -100, 3),
         "output.crs=utm" AT(-85, 70, 3),
+        "output.crs=geodetic" AT(90, 12, 3),
+        "output.crs=geodetic" AT(-89.9999, 30, 3), /* 11 m from the pole */
+        "output.crs=utm" AT(90, 12, 3),
+        "output.crs=ecef" AT(-90, 12, 3),
         "output.crs=local",
     };
     need_python();

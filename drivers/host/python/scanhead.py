@@ -885,7 +885,7 @@ def _place_moving(leg: _Leg, t_ns: int, v) -> Tuple[float, float, float]:
 class _Plain:
     """The functions of numpy that are used here, for plain floats."""
     sin, cos, tan, sinh, cosh = math.sin, math.cos, math.tan, math.sinh, math.cosh
-    sqrt, hypot = math.sqrt, math.hypot
+    sqrt, hypot, exp = math.sqrt, math.hypot, math.exp
     arctan, arctan2, arcsinh, arctanh = math.atan, math.atan2, math.asinh, math.atanh
 
 
@@ -964,7 +964,7 @@ class _Grid:
         tau_c = _conformal(m.tan(lat_deg * _RAD), m)
         if self.ups:
             lon, side = lon_deg * _RAD, -1.0 if self.south else 1.0
-            rho = _UPS_M / (side * tau_c + m.sqrt(1 + tau_c * tau_c))
+            rho = _UPS_M * m.exp(-m.arcsinh(side * tau_c))  # t + sqrt(1 + t^2), which is 0 about the other pole
             return 2e6 + rho * m.sin(lon), 2e6 - side * rho * m.cos(lon)
         lon = (lon_deg - self.lon0_deg) * _RAD
         xi, eta = m.arctan2(tau_c, m.cos(lon)), m.arcsinh(m.sin(lon) / m.hypot(tau_c, m.cos(lon)))

@@ -146,8 +146,7 @@ export function geoidHeight(a) {
  * is not known. Heights are then taken as ellipsoidal, and the whole scene is too low or too high by the geoid's
  * height. */
 export function toScene(a) {
-  const shift = (p) => plus(a.station_m, transposedTimes(a.axes, minus(p, a.anchor)));
-  if (a.crs === 0) return {isFlat: true, at: shift};
+  if (a.crs === 0) return {isFlat: true, at: (p) => p};
   const geoid_m = geoidHeight(a);
   const own = gridOfScene(a), grid = a.crs === 2 ? gridOf(a.epsg) : null;
   const lift_m = a.station_m[2] - a.height_m; // a scene in a grid has heights that differ by this
