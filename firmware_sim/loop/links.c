@@ -100,7 +100,7 @@ static int is_loopback(const char *address)
            strcmp(address, "::1") == 0;
 }
 
-/* Warns where other machines can reach a link: a head has no password, and a user may not expect that. */
+/* Warns where other machines can reach a link: a head keeps no secret, and a user may not expect that. */
 static void warn_open(const struct links *links, const struct link_spec *spec, const struct pump *pump)
 {
     struct link_place place;
@@ -108,7 +108,8 @@ static void warn_open(const struct links *links, const struct link_spec *spec, c
         is_loopback(spec->address))
         return;
     pump_get_place(pump, &place);
-    sh_warn(links->report, "link %s: other machines can reach and command it: there is no password", place.endpoint);
+    sh_warn(links->report, "link %s: other machines can reach and command it: there is no %spassword", place.endpoint,
+            spec->protocol == PROTOCOL_COLA ? "secret " : "");
 }
 
 int links_open(struct links *links, const struct config *cfg, const struct link_spec *extra, struct sh_err *err)

@@ -5,8 +5,8 @@
  * All frames before the tick with which power goes are written, if the client reads fast enough; in the paces that wait
  * for readers, in any case. Bytes that the client's system has not taken by then may be lost with the connection. A
  * link that no cable and no connection can end, such as a file, goes on where it was; a protocol that is not native is
- * silent until power comes, and begins anew then. With `loop.pace: step`, links come back at once, since their clients let time
- * pass. */
+ * silent until power comes, and begins anew then. With `loop.pace: step`, links come back at once, since their clients
+ * let time pass. */
 #include "firmware_sim/loop/pump_inside.h"
 
 /* Whether everything released before `tick` is written, or the client does not take it. */

@@ -24,7 +24,7 @@ soak-long: deps-build
 	@$(MAKE) --no-print-directory -j2 all
 	@python3 tests/soak/long.py --seconds $(SOAK_LONG_S) --scanhead $(BUILD)/scanhead --out $(BUILD)/soak-long
 
-# This aims 10^9 rays at edges and corners, and none may leak. `make test` aims 10^6.
+# This aims 10^9 rays at edges and corners, and none may leak. `make test` aims 6 x 10^5.
 LEAKS ?= 1e9
 #? leaks             LEAKS=1e9 rays aimed at edges and corners: none may pass
 leaks: deps-build
