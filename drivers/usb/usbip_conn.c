@@ -113,12 +113,11 @@ static void run_submit(struct usbip_conn *conn, struct usbip_urb *urb)
 
 static void take_submit(struct usbip_conn *conn)
 {
-    const uint32_t direction = be_get32(conn->head + 12), length = be_get32(conn->head + 24),
-                   packets = be_get32(conn->head + 32);
+    const uint32_t direction = be_get32(conn->head + 12), endpoint = be_get32(conn->head + 16),
+                   length = be_get32(conn->head + 24), packets = be_get32(conn->head + 32);
     struct usbip_urb *urb = NULL;
-    if (direction <= DIR_IN && length <= MAX_URB_BYTES && (packets == 0 || packets == UINT32_MAX) &&
-        be_get32(conn->head + 16) <= 15)
-        urb = usbip_urb_new(conn, length);
+    if (direction <= DIR_IN && length <= MAX_URB_BYTES && (packets == 0 || packets == UINT32_MAX) && endpoint <= 15)
+        urb = usbip_urb_new(conn, endpoint, length);
     if (urb == NULL) {
         conn->broken = 1;
         return;

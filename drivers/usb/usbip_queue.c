@@ -9,9 +9,8 @@
 
 enum { MAX_REPLY_PARTS = 64 };
 
-struct usbip_urb *usbip_urb_new(struct usbip_conn *conn, uint32_t room)
+static struct usbip_urb *make_urb(struct usbip_conn *conn, uint32_t room)
 {
-    if (conn->n_pending >= MAX_PENDING || conn->pending_bytes + room > MAX_PENDING_BYTES) return NULL;
     struct usbip_urb *urb = malloc(sizeof *urb + URB_HEADER + room);
     if (urb == NULL) return NULL;
     memset(urb, 0, sizeof *urb + URB_HEADER); /* the bytes are written before they are sent */
@@ -19,6 +18,14 @@ struct usbip_urb *usbip_urb_new(struct usbip_conn *conn, uint32_t room)
     conn->n_pending++;
     conn->pending_bytes += room;
     return urb;
+}
+
+struct usbip_urb *usbip_urb_new(struct usbip_conn *conn, unsigned endpoint, uint32_t room)
+{
+    const uint32_t most = MAX_PENDING + (endpoint == 0 ? MORE_CONTROL : 0);
+    const uint64_t most_bytes = MAX_PENDING_BYTES + (endpoint == 0 ? MORE_CONTROL_BYTES : 0);
+    if (conn->n_pending >= most || conn->pending_bytes + room > most_bytes) return NULL;
+    return make_urb(conn, room);
 }
 
 void usbip_urb_free(struct usbip_conn *conn, struct usbip_urb *urb)
@@ -57,7 +64,7 @@ static void drop_first(struct usbip_conn *conn)
 
 uint8_t *usbip_queue_plain(struct usbip_conn *conn, uint32_t len)
 {
-    struct usbip_urb *reply = usbip_urb_new(conn, len > URB_HEADER ? len - URB_HEADER : 0);
+    struct usbip_urb *reply = make_urb(conn, len > URB_HEADER ? len - URB_HEADER : 0);
     if (reply == NULL) {
         conn->broken = 1;
         return NULL;

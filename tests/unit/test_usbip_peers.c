@@ -315,12 +315,42 @@ static void test_bytes_pending(void **state)
     bench_close(&bench);
 }
 
+/* Up to 4096 requests may wait for the device (USB.md). A request on endpoint 0 and an UNLINK don't count among them:
+ * the protocol's documentation has an answer to each UNLINK. One more read cuts the client off. */
+static void test_requests_pending(void **state)
+{
+    (void)state;
+    enum { MOST = 4096 };
+    struct bench bench = usbip_bench("N");
+    struct client c;
+    uint8_t byte;
+    client_import(&c, &bench);
+    client_configure(&c);
+    client_open_stream(&c);
+    for (int i = 0; i < MOST; i++)
+        client_submit(&c, 1, 3, NULL, NULL, 512);
+    assert_int_equal(client_control(&c, &r, 0x80, GET_STATUS, 0, 0, 2, NULL), 0);
+    for (int waits = 0; waits < 2; waits++) { /* an answered one, and one that waits: the first read is number 3 */
+        const uint32_t unlink = client_unlink(&c, waits ? 3 : 1);
+        assert_true(client_reply(&c, &r, 0));
+        assert_int_equal(r.command, 4);
+        assert_int_equal(r.seqnum, unlink);
+        assert_int_equal(r.status, waits ? ECONNRESET_WIRE : 0);
+    }
+    client_submit(&c, 1, 3, NULL, NULL, 512);
+    assert_int_equal(client_control(&c, &r, 0x80, GET_STATUS, 0, 0, 2, NULL), 0);
+    client_submit(&c, 1, 3, NULL, NULL, 512);
+    assert_false(client_read(&c, &byte, 1));
+    close(c.fd);
+    bench_close(&bench);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_silent),        cmocka_unit_test(test_oldest),    cmocka_unit_test(test_pipelining),
         cmocka_unit_test(test_turns),         cmocka_unit_test(test_segments),  cmocka_unit_test(test_short_not_ok),
-        cmocka_unit_test(test_bytes_pending), cmocka_unit_test(test_next_host),
+        cmocka_unit_test(test_bytes_pending), cmocka_unit_test(test_next_host), cmocka_unit_test(test_requests_pending),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
