@@ -17,8 +17,8 @@
  *
  * IN packets: a transfer ends when it is full, or with a short packet. The data of one usb_device_write() end with a
  * short packet, or with a zero-length packet where they are a whole number of packets. Where they filled the transfer
- * exactly, the zero-length packet ends the next transfer that is submitted, unless more is written first. A transfer that
- * waits already stays: each end that carries nothing costs a reader of a stream a turn. On an endpoint that has `units`
+ * exactly, the zero-length packet ends the next transfer that is submitted, unless more is written first. A transfer
+ * that waits already stays: an end that carries nothing costs a reader of a stream a turn. On an endpoint that has `units`
  * (model.h: the data of one write are a unit) that packet always comes before further data: at once if another transfer
  * waits, else with the next one that is submitted. A transfer whose rest is smaller than the next packet fails with
  * USB_OVERFLOW, as on a real bus. The packet that did not fit stays with the function: nothing is lost.
