@@ -76,7 +76,7 @@ static int usbredir_start(struct usbredir *self, int fd)
     uint32_t caps[USB_REDIR_CAPS_SIZE] = {0};
     struct usbredirparser *parser = usbredirparser_create();
     if (parser == NULL) return SH_ENOMEM;
-    socket_tune(fd);
+    socket_tune(fd); /* not impatient: QEMU doesn't read while its machine is paused, and must not be cut off then */
     setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &size, sizeof size);
     parser->priv = self;
     parser->log_func = on_log;
