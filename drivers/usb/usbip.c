@@ -143,13 +143,23 @@ static void usbip_welcome(struct usbip *self, const struct usb_owner *owner)
     }
 }
 
+/* Says why a host loses the device. A client without the device, such as a scanner of ports, is not worth a word. */
+static void say_why(const struct usbip_conn *conn, const struct usb_owner *owner)
+{
+    char text[160];
+    if (!conn->imported || conn->why == NULL) return;
+    snprintf(text, sizeof text, "the USB/IP host is cut off: %s", conn->why);
+    owner->say(owner->ctx, text);
+}
+
 static int sweep(struct usbip *self, const struct usb_owner *owner)
 {
     int rc = SH_OK;
     for (int i = 0; i < MAX_CONNS; i++) {
         if (self->conn[i].fd < 0 || !self->conn[i].broken) continue;
-        usbip_conn_end(&self->conn[i]);
         if (self->here && !self->unplugged) rc = usb_retry_start(&self->retry, owner);
+        say_why(&self->conn[i], owner);
+        usbip_conn_end(&self->conn[i]);
     }
     return rc;
 }

@@ -9,6 +9,14 @@
 
 enum { MAX_REPLY_PARTS = 64 };
 
+static const char NO_MEMORY[] = "there is no memory for its request";
+
+void usbip_conn_break(struct usbip_conn *conn, const char *why)
+{
+    conn->broken = 1;
+    conn->why = why;
+}
+
 static struct usbip_urb *make_urb(struct usbip_conn *conn, uint32_t room)
 {
     struct usbip_urb *urb = malloc(sizeof *urb + URB_HEADER + room);
@@ -24,8 +32,13 @@ struct usbip_urb *usbip_urb_new(struct usbip_conn *conn, unsigned endpoint, uint
 {
     const uint32_t most = MAX_PENDING + (endpoint == 0 ? MORE_CONTROL : 0);
     const uint64_t most_bytes = MAX_PENDING_BYTES + (endpoint == 0 ? MORE_CONTROL_BYTES : 0);
-    if (conn->n_pending >= most || conn->pending_bytes + room > most_bytes) return NULL;
-    return make_urb(conn, room);
+    if (conn->n_pending >= most || conn->pending_bytes + room > most_bytes) {
+        usbip_conn_break(conn, "more than 4096 requests, or more than 64 MiB of them, wait for the device");
+        return NULL;
+    }
+    struct usbip_urb *urb = make_urb(conn, room);
+    if (urb == NULL) usbip_conn_break(conn, NO_MEMORY);
+    return urb;
 }
 
 void usbip_urb_free(struct usbip_conn *conn, struct usbip_urb *urb)
@@ -66,7 +79,7 @@ uint8_t *usbip_queue_plain(struct usbip_conn *conn, uint32_t len)
 {
     struct usbip_urb *reply = make_urb(conn, len > URB_HEADER ? len - URB_HEADER : 0);
     if (reply == NULL) {
-        conn->broken = 1;
+        usbip_conn_break(conn, NO_MEMORY);
         return NULL;
     }
     memset(reply->wire, 0, URB_HEADER + reply->room);

@@ -63,6 +63,8 @@ static void a_host_at_the_limit_keeps_control(void **state)
                                                : i < MAX_PENDING ? 0
                                                                  : 4096));
     assert_null(usbip_urb_new(&conn, 0, 0));
+    assert_int_equal(conn.broken, 1);
+    conn.broken = 0;
     assert_non_null(usbip_queue_plain(&conn, 8));
     assert_non_null(usbip_queue_plain(&conn, 4096));
     assert_int_equal(conn.broken, 0);
