@@ -134,7 +134,7 @@ void usb_device_set_slow(struct usb_device *device, double ms);
 int usb_has_to_wait(const struct usb_device *device, const struct usb_transfer *held);
 /* Appends a request, with its id set. Requests are answered one after the other; each takes the time asked for. */
 void usb_hold(const struct usb_device *device, struct usb_transfer **held, struct usb_transfer *request);
-/* Takes out the request of that id; NULL: there is none. */
+/* Takes out the request of that id; NULL: there is none. Later ones are due earlier by the time that it had left. */
 struct usb_transfer *usb_let_go(struct usb_transfer **held, uint64_t id);
 /* Takes out the first request if its time has come; NULL: it has not, or there is none. */
 struct usb_transfer *usb_take_due(struct usb_transfer **held);
