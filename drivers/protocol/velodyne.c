@@ -283,27 +283,23 @@ static void velodyne_take_gap(void *protocol, uint32_t n_frames)
     v->is_left_over = 0; /* the loss of the gap includes the other pulses of this firing sequence */
 }
 
-/* Readers take elevations and times of firing from the model's number. */
+/* Readers take times of firing from the model's number. They take elevations from it, too, or from a calibration file,
+ * which may have any. */
 static int check_head(const struct native_descriptor *d, const struct native_emitter *e, const uint8_t *beams,
                       struct sh_err *err)
 {
     enum { FIRING_NS = 2304, SEQUENCE_NS = 55296 };
-    struct native_beam beam[VELODYNE_BEAMS];
     (void)d;
     int are_times = e->sequence_ns_num == e->sequence_ns_den * SEQUENCE_NS && e->turn > 0;
     for (uint32_t i = 0; i < VELODYNE_BEAMS; i++) {
-        native_decode_beam(beams, i, &beam[i]);
-        are_times &= beam[i].offset_ns == i * FIRING_NS && beam[i].azimuth_udeg == 0;
+        struct native_beam beam;
+        native_decode_beam(beams, i, &beam);
+        are_times &= beam.offset_ns == i * FIRING_NS && beam.azimuth_udeg == 0;
     }
-    if (model_of(beam) == 0)
-        return sh_fail(err, SH_EINPUT,
-                       "rings at other elevations; allowed are those of a VLP-16 (2 degrees apart) or a "
-                       "Puck Hi-Res (4/3 degrees), in its order of firing");
-    if (!are_times)
-        return sh_fail(err, SH_EINPUT,
-                       "another firing sequence; allowed is that of a VLP-16: clockwise, 55.296 us, with "
-                       "a beam each 2.304 us");
-    return SH_OK;
+    if (are_times) return SH_OK;
+    return sh_fail(err, SH_EINPUT,
+                   "another firing sequence; allowed is that of a VLP-16: clockwise, 55.296 us, with "
+                   "a beam each 2.304 us, all at azimuth 0");
 }
 
 /* Marks the bytes of ranges and reflectivities. */

@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/mount.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -63,14 +64,36 @@ static int started_at(long pid, unsigned long long *ticks)
     return -1;
 }
 
-/* Whether the process that made the gadget is gone: there is none of that number, or a later one has got the number. */
+/* Opens a gadget's directory and locks it. The kernel takes the lock back with the process. configfs is one for all PID
+ * namespaces, but numbers of processes differ: the lock shows that a gadget of another container is in use. Returns the
+ * descriptor; -1: another process has the lock, or there is no such gadget. */
+static int lock_gadget(const char *name)
+{
+    char dir[512];
+    snprintf(dir, sizeof dir, "%s/%s", GADGETS, name);
+    const int fd = open(dir, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (fd < 0 || flock(fd, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return fd;
+    close(fd);
+    return -1;
+}
+
+static int is_locked(const char *name)
+{
+    const int fd = lock_gadget(name);
+    if (fd >= 0) close(fd);
+    return fd < 0;
+}
+
+/* Whether the process that made the gadget is gone: there is none of that number here, or a later one has got the
+ * number, and none anywhere has the gadget locked. */
 static int is_left_behind(const char *name)
 {
     long pid;
     unsigned long long start, now;
     if (strncmp(name, PREFIX, sizeof PREFIX - 1) != 0) return 0;
     if (sscanf(name + sizeof PREFIX - 1, "%ld-%llu-", &pid, &start) != 2 || pid <= 0) return 0;
-    return started_at(pid, &now) == 0 ? now != start : errno == ENOENT || errno == ESRCH;
+    const int is_other = started_at(pid, &now) == 0 ? now != start : errno == ENOENT || errno == ESRCH;
+    return is_other && !is_locked(name);
 }
 
 static void remove_left_behind(void)
@@ -155,7 +178,10 @@ static int make_named_dir(struct gadget *gadget, struct sh_err *err)
     for (int i = 0; i < 100; i++) {
         snprintf(gadget->name, sizeof gadget->name, "%s%ld-%llu-%d", PREFIX, pid, start, i);
         snprintf(gadget->dir, sizeof gadget->dir, "%s/%s", GADGETS, gadget->name);
-        if (mkdir(gadget->dir, 0755) == 0) return SH_OK;
+        if (mkdir(gadget->dir, 0755) == 0) {
+            gadget->lock_fd = lock_gadget(gadget->name);
+            return SH_OK;
+        }
         if (errno != EEXIST) break;
     }
     int error = errno;
@@ -260,7 +286,7 @@ int gadget_create(struct gadget *gadget, const struct usb_model *model, const st
                   struct sh_err *err)
 {
     memset(gadget, 0, sizeof *gadget);
-    gadget->state_fd = -1;
+    gadget->state_fd = gadget->lock_fd = -1;
     int rc = take_part(gadget, model, err);
     if (rc == SH_OK) rc = look_for_configfs(err);
     if (rc != SH_OK) return rc;
@@ -280,7 +306,8 @@ void gadget_remove(struct gadget *gadget)
 {
     gadget_unbind(gadget);
     if (gadget->state_fd >= 0) close(gadget->state_fd);
-    gadget->state_fd = -1;
+    if (gadget->lock_fd >= 0) close(gadget->lock_fd);
+    gadget->state_fd = gadget->lock_fd = -1;
     if (gadget->mount[0] != '\0' && umount2(gadget->mount, MNT_DETACH) == 0) rmdir(gadget->mount);
     if (gadget->dir[0] != '\0') remove_all(gadget->name);
     gadget->dir[0] = gadget->mount[0] = '\0';

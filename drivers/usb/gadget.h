@@ -17,6 +17,7 @@ struct gadget {
     char mount[64]; /* where FunctionFS is mounted; empty: nowhere */
     char udc[256];  /* empty: not bound */
     int tty_number; /* /dev/ttyGSn; -1: no console */
+    int lock_fd;    /* of dir, as long as the gadget is in use; -1: none */
     int state_fd;   /* of its controller's state, where there is no FunctionFS to report it; -1: none */
     /* The part of the model that FunctionFS carries: all but the console, numbered from 0 as FunctionFS wants it. */
     struct usb_model part;

@@ -42,7 +42,6 @@ static int get_line_coding(const struct scanhead_usb *head, unsigned length, uin
 static int set_line_state(struct scanhead_usb *head, int index, unsigned value)
 {
     const int dtr = (value & DTR) != 0;
-    if ((value & ~3u) != 0) return USB_STALL;
     if (dtr && !head->session[index].open) head->session[index].state_due = 1; /* for the client that opens the port */
     set_open(head, index, dtr);
     return 0;

@@ -17,7 +17,8 @@
  *
  * IN packets: a transfer ends when it is full, or with a short packet. The data of one usb_device_write() end with a
  * short packet, or with a zero-length packet where they are a whole number of packets. Where they filled the transfer
- * exactly, the zero-length packet ends the next transfer, unless more is written first. On an endpoint that has `units`
+ * exactly, the zero-length packet ends the next transfer that is submitted, unless more is written first. A transfer
+ * that waits already stays: an end that carries nothing costs a reader of a stream a turn. On an endpoint that has `units`
  * (model.h: the data of one write are a unit) that packet always comes before further data: at once if another transfer
  * waits, else with the next one that is submitted. A transfer whose rest is smaller than the next packet fails with
  * USB_OVERFLOW, as on a real bus. The packet that did not fit stays with the function: nothing is lost.
@@ -133,7 +134,7 @@ void usb_device_set_slow(struct usb_device *device, double ms);
 int usb_has_to_wait(const struct usb_device *device, const struct usb_transfer *held);
 /* Appends a request, with its id set. Requests are answered one after the other; each takes the time asked for. */
 void usb_hold(const struct usb_device *device, struct usb_transfer **held, struct usb_transfer *request);
-/* Takes out the request of that id; NULL: there is none. */
+/* Takes out the request of that id; NULL: there is none. Later ones are due earlier by the time that it had left. */
 struct usb_transfer *usb_let_go(struct usb_transfer **held, uint64_t id);
 /* Takes out the first request if its time has come; NULL: it has not, or there is none. */
 struct usb_transfer *usb_take_due(struct usb_transfer **held);

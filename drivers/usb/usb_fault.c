@@ -54,10 +54,15 @@ void usb_hold(const struct usb_device *device, struct usb_transfer **held, struc
 
 struct usb_transfer *usb_let_go(struct usb_transfer **held, uint64_t id)
 {
-    while (*held != NULL && (*held)->id != id)
-        held = &(*held)->next;
+    int64_t from_ns = monotonic_ns();
+    for (; *held != NULL && (*held)->id != id; held = &(*held)->next)
+        if ((*held)->due_ns > from_ns) from_ns = (*held)->due_ns;
     struct usb_transfer *request = *held;
-    if (request != NULL) *held = request->next;
+    if (request == NULL) return NULL;
+    *held = request->next;
+    const int64_t left_ns = request->due_ns - from_ns; /* of its time; later requests don't wait for that */
+    for (struct usb_transfer *at = request->next; at != NULL && left_ns > 0; at = at->next)
+        at->due_ns -= left_ns;
     return request;
 }
 

@@ -143,13 +143,23 @@ static void usbip_welcome(struct usbip *self, const struct usb_owner *owner)
     }
 }
 
+/* Says why a host loses the device. A client without the device, such as a scanner of ports, is not worth a word. */
+static void say_why(const struct usbip_conn *conn, const struct usb_owner *owner)
+{
+    char text[160];
+    if (!conn->imported || conn->why == NULL) return;
+    snprintf(text, sizeof text, "the USB/IP host is cut off: %s", conn->why);
+    owner->say(owner->ctx, text);
+}
+
 static int sweep(struct usbip *self, const struct usb_owner *owner)
 {
     int rc = SH_OK;
     for (int i = 0; i < MAX_CONNS; i++) {
         if (self->conn[i].fd < 0 || !self->conn[i].broken) continue;
-        usbip_conn_end(&self->conn[i]);
         if (self->here && !self->unplugged) rc = usb_retry_start(&self->retry, owner);
+        say_why(&self->conn[i], owner);
+        usbip_conn_end(&self->conn[i]);
     }
     return rc;
 }
@@ -170,12 +180,28 @@ static void usbip_flush(void *backend)
         if (self->conn[i].fd >= 0) usbip_conn_write(&self->conn[i]);
 }
 
+/* Whether the host that has the device has hung up. What it sent before is read within the next turns, and the device
+ * is free then. A full connection is no such case, since it is not read until its host takes replies. */
+static int is_host_leaving(const struct usbip *self)
+{
+    for (int i = 0; i < MAX_CONNS; i++) {
+        const struct usbip_conn *conn = &self->conn[i];
+        struct pollfd slot = {.fd = conn->fd, .events = POLLRDHUP};
+        if (conn->fd < 0 || !conn->imported) continue;
+        return conn->broken || (!usbip_conn_is_full(conn) && poll(&slot, 1, 0) > 0);
+    }
+    return 0;
+}
+
 static int usbip_handle(void *backend, const struct pollfd *fds, int n, const struct usb_owner *owner)
 {
     struct usbip *self = backend;
     if (n != N_FDS) return SH_OK;
-    for (int i = 0; i < MAX_CONNS; i++)
-        if (self->conn[i].fd >= 0 && (fds[i].revents & ~POLLOUT) != 0) usbip_conn_read(&self->conn[i], owner);
+    for (int i = 0; i < MAX_CONNS; i++) {
+        if (self->conn[i].fd < 0 || (fds[i].revents & ~POLLOUT) == 0) continue;
+        /* An IMPORT that came after the host had hung up must not be answered as busy: it waits for the next turn. */
+        if (self->conn[i].imported || !is_host_leaving(self)) usbip_conn_read(&self->conn[i], owner);
+    }
     for (int i = 0; i < MAX_CONNS; i++)
         if (self->conn[i].fd >= 0) usbip_conn_answer_slow(&self->conn[i], owner);
     if (fds[AT_LISTENER].fd >= 0 && fds[AT_LISTENER].revents != 0) usbip_welcome(self, owner);

@@ -113,16 +113,18 @@ static void run_submit(struct usbip_conn *conn, struct usbip_urb *urb)
 
 static void take_submit(struct usbip_conn *conn)
 {
-    const uint32_t direction = be_get32(conn->head + 12), length = be_get32(conn->head + 24),
-                   packets = be_get32(conn->head + 32);
-    struct usbip_urb *urb = NULL;
-    if (direction <= DIR_IN && length <= MAX_URB_BYTES && (packets == 0 || packets == UINT32_MAX) &&
-        be_get32(conn->head + 16) <= 15)
-        urb = usbip_urb_new(conn, length);
-    if (urb == NULL) {
-        conn->broken = 1;
+    const uint32_t direction = be_get32(conn->head + 12), endpoint = be_get32(conn->head + 16),
+                   length = be_get32(conn->head + 24), packets = be_get32(conn->head + 32);
+    if (direction > DIR_IN || (packets != 0 && packets != UINT32_MAX) || endpoint > 15) {
+        usbip_conn_break(conn, "a request without a valid direction or endpoint, or with isochronous packets");
         return;
     }
+    if (length > MAX_URB_BYTES) {
+        usbip_conn_break(conn, "a request of more than 16 MiB");
+        return;
+    }
+    struct usbip_urb *urb = usbip_urb_new(conn, endpoint, length);
+    if (urb == NULL) return;
     urb->transfer.id = be_get32(conn->head + 4); /* its sequence number */
     urb->in = direction == DIR_IN;
     urb->short_is_error = (be_get32(conn->head + 20) & URB_SHORT_NOT_OK) != 0;
@@ -150,13 +152,13 @@ static void take_urb(struct usbip_conn *conn)
     const uint32_t command = be_get32(conn->head);
     conn->head_len = 0;
     if (be_get32(conn->head + 8) != usbip_devid(conn->device))
-        conn->broken = 1;
+        usbip_conn_break(conn, "a request to another device");
     else if (command == CMD_SUBMIT)
         take_submit(conn);
     else if (command == CMD_UNLINK)
         take_unlink(conn);
     else
-        conn->broken = 1;
+        usbip_conn_break(conn, "a command other than SUBMIT and UNLINK");
 }
 
 /* ---- bytes */

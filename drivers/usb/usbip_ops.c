@@ -76,7 +76,7 @@ static void import_device(struct usbip_conn *conn, const uint8_t *busid)
     char own[BUSID_LEN];
     put_bus_id(conn->device, own, sizeof own);
     const int known = strncmp((const char *)busid, own, BUSID_LEN) == 0;
-    const uint32_t status = !known ? OP_FAILED : *conn->taken ? OP_BUSY : OP_OK;
+    const uint32_t status = !known ? OP_NO_DEVICE : *conn->taken ? OP_BUSY : OP_OK;
     uint8_t *out = usbip_queue_plain(conn, OP_HEADER + (status == OP_OK ? OP_DEVICE : 0));
     if (out == NULL) return;
     put_op(out, OP_REP_IMPORT, status);
@@ -96,7 +96,7 @@ void usbip_op_take(struct usbip_conn *conn)
     const unsigned code = be_get16(conn->head + 2);
     conn->head_len = 0;
     if (be_get16(conn->head) != USBIP_VERSION || (code != OP_REQ_DEVLIST && code != OP_REQ_IMPORT))
-        conn->broken = 1;
+        usbip_conn_break(conn, "an operation of another version or number");
     else if (code == OP_REQ_DEVLIST)
         list_devices(conn);
     else

@@ -20,8 +20,8 @@ enum {
     OP_REQ_IMPORT = 0x8003,
     OP_REP_IMPORT = 0x0003,
     OP_OK = 0,
-    OP_FAILED = 1,
     OP_BUSY = 2,
+    OP_NO_DEVICE = 4, /* as ST_NODEV of Linux's usbip */
     BUSID_LEN = 32,
     /* a device: char[256] path, char[32] bus id, u32 bus, device, speed, u16 vid, pid, bcd, u8 class,
      * subclass, protocol, configuration, configurations, interfaces */
@@ -54,7 +54,8 @@ struct usbip_conn {
     int fd;          /* -1: free */
     uint64_t number; /* of arrival */
     int imported;
-    int broken; /* to be closed: the peer is gone, or broke the protocol */
+    int broken;      /* to be closed: the peer is gone, or broke the protocol */
+    const char *why; /* broken: what the peer did wrong; NULL: it is gone */
     struct usb_device *device;
     int *taken; /* shared: the device is imported by some connection */
     uint8_t head[URB_HEADER];
@@ -85,9 +86,9 @@ void usbip_conn_drain(struct usbip_conn *conn, int timeout_ms);
 /* Detaches the device if it was imported here, frees everything, and closes fd. */
 void usbip_conn_end(struct usbip_conn *conn);
 
-/* Limits of what the host has asked for and the device has not answered. A host that asks for more is cut
- * off. */
-enum { MAX_PENDING = 4096, MAX_PENDING_BYTES = 64 << 20 };
+/* Limits of what the host has asked for and the device has not answered. A host that asks for more is cut off. Requests
+ * on endpoint 0 may go beyond these limits by the second two, so that a host with many transfers still has control. */
+enum { MAX_PENDING = 4096, MAX_PENDING_BYTES = 64 << 20, MORE_CONTROL = 256, MORE_CONTROL_BYTES = 1 << 20 };
 /* Limits of answers that are not sent yet. Above these nothing more is read until the host has taken some. */
 enum { MAX_UNSENT = 256, MAX_UNSENT_BYTES = 1 << 20 };
 
@@ -105,16 +106,19 @@ struct usbip_urb {
 
 /* ---- usbip_queue.c */
 
-/* A new URB. NULL: too much is pending, or no memory. The URB counts as pending until it is queued or freed. */
-struct usbip_urb *usbip_urb_new(struct usbip_conn *conn, uint32_t room);
+/* A new URB of an endpoint. NULL: too much is pending, or no memory; the connection is broken. The URB counts as pending until it is queued or
+ * freed. */
+struct usbip_urb *usbip_urb_new(struct usbip_conn *conn, unsigned endpoint, uint32_t room);
 /* Frees an URB that was not queued. */
 void usbip_urb_free(struct usbip_conn *conn, struct usbip_urb *urb);
 /* Queues the URB as a reply of len bytes of wire. The URB is freed once it is sent. */
 void usbip_queue(struct usbip_conn *conn, struct usbip_urb *urb, uint32_t len);
-/* Queues a reply of len bytes without an URB, and returns these bytes, all 0, to be filled in. NULL: the connection is
- * broken. */
+/* Queues a reply of len bytes without an URB, whatever is pending, and returns these bytes, all 0, to be filled in.
+ * NULL: no memory, and the connection is broken. */
 uint8_t *usbip_queue_plain(struct usbip_conn *conn, uint32_t len);
 void usbip_queue_clear(struct usbip_conn *conn);
+/* Breaks the connection for a reason that the owner is to know. */
+void usbip_conn_break(struct usbip_conn *conn, const char *why);
 
 /* ---- usbip_ops.c */
 

@@ -9,15 +9,35 @@
 
 enum { MAX_REPLY_PARTS = 64 };
 
-struct usbip_urb *usbip_urb_new(struct usbip_conn *conn, uint32_t room)
+static const char NO_MEMORY[] = "there is no memory for its request";
+
+void usbip_conn_break(struct usbip_conn *conn, const char *why)
 {
-    if (conn->n_pending >= MAX_PENDING || conn->pending_bytes + room > MAX_PENDING_BYTES) return NULL;
+    conn->broken = 1;
+    conn->why = why;
+}
+
+static struct usbip_urb *make_urb(struct usbip_conn *conn, uint32_t room)
+{
     struct usbip_urb *urb = malloc(sizeof *urb + URB_HEADER + room);
     if (urb == NULL) return NULL;
     memset(urb, 0, sizeof *urb + URB_HEADER); /* the bytes are written before they are sent */
     urb->room = room;
     conn->n_pending++;
     conn->pending_bytes += room;
+    return urb;
+}
+
+struct usbip_urb *usbip_urb_new(struct usbip_conn *conn, unsigned endpoint, uint32_t room)
+{
+    const uint32_t most = MAX_PENDING + (endpoint == 0 ? MORE_CONTROL : 0);
+    const uint64_t most_bytes = MAX_PENDING_BYTES + (endpoint == 0 ? MORE_CONTROL_BYTES : 0);
+    if (conn->n_pending >= most || conn->pending_bytes + room > most_bytes) {
+        usbip_conn_break(conn, "more than 4096 requests, or more than 64 MiB of them, wait for the device");
+        return NULL;
+    }
+    struct usbip_urb *urb = make_urb(conn, room);
+    if (urb == NULL) usbip_conn_break(conn, NO_MEMORY);
     return urb;
 }
 
@@ -57,9 +77,9 @@ static void drop_first(struct usbip_conn *conn)
 
 uint8_t *usbip_queue_plain(struct usbip_conn *conn, uint32_t len)
 {
-    struct usbip_urb *reply = usbip_urb_new(conn, len > URB_HEADER ? len - URB_HEADER : 0);
+    struct usbip_urb *reply = make_urb(conn, len > URB_HEADER ? len - URB_HEADER : 0);
     if (reply == NULL) {
-        conn->broken = 1;
+        usbip_conn_break(conn, NO_MEMORY);
         return NULL;
     }
     memset(reply->wire, 0, URB_HEADER + reply->room);

@@ -76,7 +76,7 @@ static int usbredir_start(struct usbredir *self, int fd)
     uint32_t caps[USB_REDIR_CAPS_SIZE] = {0};
     struct usbredirparser *parser = usbredirparser_create();
     if (parser == NULL) return SH_ENOMEM;
-    socket_tune(fd);
+    socket_tune(fd); /* not impatient: QEMU doesn't read while its machine is paused, and must not be cut off then */
     setsockopt(fd, SOL_SOCKET, SO_SNDBUF, &size, sizeof size);
     parser->priv = self;
     parser->log_func = on_log;
@@ -91,6 +91,7 @@ static int usbredir_start(struct usbredir *self, int fd)
     self->fd = fd;
     self->parser = parser;
     self->broken = self->greeted = 0;
+    self->why = NULL;
     usbredirparser_init(parser, version, caps, USB_REDIR_CAPS_SIZE, usbredirparser_fl_usb_host);
     return SH_OK;
 }
@@ -209,6 +210,24 @@ static int usbredir_prepare(void *backend, struct pollfd *fds)
     return N_FDS;
 }
 
+static void read_packets(struct usbredir *self)
+{
+    const int rc = usbredirparser_do_read(self->parser);
+    if (rc == usbredirparser_read_parse_error)
+        usbredir_break(self, "a packet that breaks the protocol");
+    else if (rc != 0)
+        self->broken = 1;
+}
+
+/* Says why a guest loses the device. A client that is no guest yet is not worth a word. */
+static void say_why(const struct usbredir *self)
+{
+    char text[160];
+    if (!self->greeted || self->why == NULL) return;
+    snprintf(text, sizeof text, "the usbredir guest is cut off: %s", self->why);
+    self->owner->say(self->owner->ctx, text);
+}
+
 static int usbredir_handle(void *backend, const struct pollfd *fds, int n, const struct usb_owner *owner)
 {
     struct usbredir *self = backend;
@@ -218,17 +237,18 @@ static int usbredir_handle(void *backend, const struct pollfd *fds, int n, const
     self->n_reads = 0;
     if (self->fd >= 0 && self->parser == NULL && fds[AT_GUEST].revents != 0)
         rc = end_connect(self, usb_backend_connect_error(self->fd));
-    else if (self->parser != NULL && (fds[AT_GUEST].revents & ~POLLOUT) != 0 &&
-             usbredirparser_do_read(self->parser) != 0)
-        self->broken = 1;
+    else if (self->parser != NULL && (fds[AT_GUEST].revents & ~POLLOUT) != 0)
+        read_packets(self);
     if (!self->greeted && fds[AT_LISTENER].fd >= 0 && fds[AT_LISTENER].revents != 0) usbredir_welcome(self);
     if (rc == SH_OK && fds[AT_RETRY].fd >= 0 && usb_retry_is_due(&self->retry, fds[AT_RETRY].revents))
         rc = connect_again(self);
     usbredir_answer_slow(self);
     usbredir_flush(self);
     if (!self->broken) return rc;
+    if (self->listener < 0 && rc == SH_OK) rc = usb_retry_start(&self->retry, self->owner);
+    say_why(self);
     usbredir_stop(self);
-    return self->listener >= 0 || rc != SH_OK ? rc : usb_retry_start(&self->retry, self->owner);
+    return rc;
 }
 
 static int64_t usbredir_due_ns(const void *backend)

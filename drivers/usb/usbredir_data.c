@@ -132,7 +132,8 @@ static void on_bulk(void *priv, uint64_t id, struct usb_redir_bulk_packet_header
                                           : new_transfer(self, in ? length : 0, length);
     if (transfer == NULL) {
         usbredirparser_free_packet_data(self->parser, data);
-        self->broken = 1;
+        usbredir_break(
+            self, "more than 4096 bulk packets or 64 MiB wait, a packet has another length, or there is no memory");
         return;
     }
     transfer->bulk = *header;

@@ -16,10 +16,11 @@ struct usbredir {
     struct usb_device *device;
     int listener, fd;              /* -1: none */
     struct usbredirparser *parser; /* NULL: no connection (yet) */
-    int broken;
-    int greeted;               /* its hello has come */
-    int unplugged;             /* by an injected fault */
-    struct usb_transfer *held; /* requests that are answered later; each is the first member of a redir_request */
+    int broken;                    /* to be ended */
+    const char *why;               /* broken: what the guest did wrong; NULL: it is gone */
+    int greeted;                   /* its hello has come */
+    int unplugged;                 /* by an injected fault */
+    struct usb_transfer *held;     /* requests that are answered later; each is the first member of a redir_request */
     uint32_t n_held;
     const struct usb_owner *owner; /* within handle() */
     int n_reads;                   /* within one call of handle */
@@ -35,6 +36,13 @@ struct usbredir {
     ino_t path_inode;
     char name[USB_BACKEND_NAME_MAX];
 };
+
+/* Marks the connection broken for a reason that the owner is to know. */
+static inline void usbredir_break(struct usbredir *self, const char *why)
+{
+    self->broken = 1;
+    self->why = why;
+}
 
 /* usbredir_requests.c */
 void usbredir_take_requests(struct usbredirparser *parser);

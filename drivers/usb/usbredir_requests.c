@@ -164,7 +164,7 @@ static void hold(struct usbredir *self, const struct redir_request *given)
     struct redir_request *r = self->n_held < MAX_HELD ? malloc(sizeof *r) : NULL;
     if (r == NULL) {
         usbredirparser_free_packet_data(self->parser, given->data);
-        self->broken = 1;
+        usbredir_break(self, "more than 256 control packets wait, or there is no memory");
         return;
     }
     *r = *given;

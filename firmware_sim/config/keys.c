@@ -240,7 +240,7 @@ static const struct cfg_key config_keys[] = {
     {LINK(pid), CFG_COUNT, NULL, "0x0001", 0, 65535, .flags = CFG_HEX, .allowed = "0x0000 to 0xffff",
      .of = CFG_KIND(LINK_USB),
      .help = "usb: product id. When not given: native 0x0001, scip 0x0000, cola 0x5001."},
-    {LINK(serial), CFG_TEXT, .def = "", .example = "SIM-0002", .of = CFG_KIND(LINK_USB),
+    {LINK(serial), CFG_TEXT, .def = "", .example = "SIM-0002", .flags = CFG_ASCII, .of = CFG_KIND(LINK_USB),
      .help = "usb: serial number. When not given: head.serial where that is given, else SIM-0001 and eight "
              "hexadecimal digits that identify this head on this machine; with scip none, as the real device. Only the "
              "USB device has these digits, not *IDN?."},

@@ -3,6 +3,7 @@
 #include <stdio.h>
 
 #include "drivers/protocol/native.h"
+#include "drivers/protocol/native_encode.h"
 #include "drivers/protocol/velodyne.h"
 #include "firmware_sim/config/check_links.h"
 #include "firmware_sim/config/config.h"
@@ -77,18 +78,56 @@ static int has_kind(const struct protocol_ops *ops, const struct emitter *emitte
     return ops->emitters == 0 || (ops->emitters & 1u << emitter->kind) != 0;
 }
 
-int cfg_protocol_fits(const struct protocol_ops *ops, const struct emitter *emitter)
+static int has_beams(const struct protocol_ops *ops, const struct emitter *emitter)
 {
-    return has_kind(ops, emitter) &&
-           (emitter->kind != EMITTER_BEAMS || ops->n_beams == 0 || ops->n_beams == emitter->n_beams);
+    return emitter->kind != EMITTER_BEAMS || ops->n_beams == 0 || ops->n_beams == emitter->n_beams;
+}
+
+/* Asks the protocol about an emitter as it asks about one of a recording: as the native frame describes it. */
+static int ask_protocol(const struct protocol_ops *ops, const struct emitter *from, double pan_counts,
+                        struct sh_err *why)
+{
+    const struct native_descriptor descriptor = {.pan_counts_per_turn = pan_counts};
+    struct native_emitter e = {.kind = from->kind, /* the same numbers, as asserted above */
+                               .n_beams = from->n_beams,
+                               .steps = from->steps,
+                               .first_step = (int32_t)from->first_step,
+                               .last_step = (int32_t)from->last_step,
+                               .front_step = (int32_t)from->front_step,
+                               .turn = from->turn,
+                               .sequence_ns_num = from->sequence_ticks * from->tick_num,
+                               .sequence_ns_den = from->tick_den};
+    struct native_beam beam[NATIVE_MAX_BEAMS];
+    uint8_t frame[NATIVE_HEADER_LEN + NATIVE_EMITTER_HEAD_LEN + NATIVE_MAX_BEAMS * NATIVE_BEAM_LEN];
+    for (uint32_t i = 0; i < from->n_beams; i++)
+        beam[i] = (struct native_beam){(int32_t)from->beam[i].elevation_udeg, (int32_t)from->beam[i].azimuth_udeg,
+                                       from->beam[i].offset_ns};
+    native_encode_emitter(frame, sizeof frame, &e, beam, 0, 0);
+    return ops->check_head(&descriptor, &e, frame + NATIVE_HEADER_LEN, why);
+}
+
+/* A head with geometries changes between them by command, so all of them have to fit. */
+int cfg_protocol_fits(const struct protocol_ops *ops, const struct config_profile *profile, struct sh_err *why)
+{
+    const double pan_counts = profile->pan_counts > 0 ? profile->pan_counts : 4294967296.0;
+    const uint32_t n = profile->arrangement.n_geometries;
+    if (!has_kind(ops, &profile->emitter) || !has_beams(ops, &profile->emitter)) return 0;
+    if (ops->check_head == NULL) return 1;
+    struct config_profile p = *profile;
+    for (uint32_t i = 0; i < n; i++) {
+        config_set_steps(&p, profile->arrangement.geometry[i].steps_per_turn);
+        if (ask_protocol(ops, &p.emitter, pan_counts, why) != SH_OK) return 0;
+    }
+    return n > 0 || ask_protocol(ops, &p.emitter, pan_counts, why) == SH_OK;
 }
 
 /* The head's emitter must be one that the protocol can describe. */
 static void check_head(struct cfg_reader *rd, const struct config *cfg, uint32_t i, const struct protocol_ops *ops)
 {
     const struct emitter *emitter = &cfg->profile.emitter;
+    struct sh_err why;
     char where[40], allowed[64];
-    if (!cfg_has_profile(rd) || cfg_protocol_fits(ops, emitter)) return;
+    if (!cfg_has_profile(rd) || cfg_protocol_fits(ops, &cfg->profile, &why)) return;
     if (cfg->link[i].protocol == PROTOCOL_CAPTURE) {
         cfg_fail_item(rd, PROTOCOL_KEY, i,
                       "capture is for `run FILE.pcap`; allowed for a head are all other protocols");
@@ -100,9 +139,12 @@ static void check_head(struct cfg_reader *rd, const struct config *cfg, uint32_t
                       "protocol %s does not support head profile %s%s, whose emitter is %s; allowed emitters: %s",
                       ops->name, cfg->profile.name, where, emitter_names[emitter->kind],
                       cfg_list_kinds(ops->emitters, emitter_names, allowed, sizeof allowed));
-    else
+    else if (!has_beams(ops, emitter))
         cfg_fail_item(rd, PROTOCOL_KEY, i, "%s has %u beams, but head profile %s%s has %u; allowed %u", ops->name,
                       ops->n_beams, cfg->profile.name, where, emitter->n_beams, ops->n_beams);
+    else
+        cfg_fail_item(rd, PROTOCOL_KEY, i, "protocol %s does not support head profile %s%s, which has %s", ops->name,
+                      cfg->profile.name, where, why.text);
 }
 
 /* The default source port is that of the real device's packets. */

@@ -24,11 +24,12 @@ static const char *span(double low, double high, char buf[64])
 
 static void put_protocols(const struct config_profile *p, FILE *out)
 {
+    struct sh_err why;
     int n = 0;
     fputs("  protocols ", out);
     for (int id = 0; id < PROTOCOL_N; id++) {
         const struct protocol_ops *ops = protocol_ops_get((enum protocol_id)id);
-        if (cfg_protocol_fits(ops, &p->emitter)) fprintf(out, "%s %s", n++ > 0 ? "," : "", ops->name);
+        if (cfg_protocol_fits(ops, p, &why)) fprintf(out, "%s %s", n++ > 0 ? "," : "", ops->name);
     }
     fputc('\n', out);
 }

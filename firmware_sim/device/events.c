@@ -16,6 +16,8 @@ void device_push_event(struct device_events *events, enum native_event_code code
     struct native_event *event = &events->event[events->n++];
     *event = (struct native_event){.code = (uint32_t)code, .a = a, .b = b, .c = c};
     snprintf(event->text, sizeof event->text, "%s", text != NULL ? text : "");
+    for (char *p = event->text; *p != '\0'; p++)
+        if (*p < 0x20 || *p > 0x7e) *p = '~'; /* names of stations, for one, are UTF-8 */
 }
 
 void device_push_error(struct device_events *events, uint32_t session, int number, const char *text)

@@ -31,6 +31,8 @@ struct device_events {
     const uint64_t *next_tick; /* the device's: the next one to be claimed */
 };
 
+/* Adds an event. Bytes of its text that are not printable ASCII become '~', as in error texts. A text that does not fit is
+ * cut. NULL: no text. */
 void device_push_event(struct device_events *events, enum native_event_code code, uint64_t a, uint64_t b, uint64_t c,
                        const char *text);
 /* Puts as many events into the work as fit. */

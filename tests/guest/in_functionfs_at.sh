@@ -11,6 +11,13 @@ if [ $speed = high ]; then
 fi
 head_start "{type: usb, backend: functionfs, speed: $speed}" --pace fast
 check_enumeration "$speed" $packet
+if [ $speed = high ]; then # a head of another container doesn't see this one's process
+    sed "\$alinks: [{type: usb, backend: functionfs}]" /head.yaml >other.yaml
+    in_use=$(ls $gadgets)
+    unshare -m -p -f sh -c 'mount -t proc none /proc && scanhead run other.yaml --duration 0.01' 2>other.err
+    check "$speed: a head of another container finds no free controller" grep 'Device or resource busy$' other.err
+    check "$speed: and leaves this head its gadget" test "$(ls $gadgets)" = "$in_use"
+fi
 check_record "$speed"
 head_stop
 check "$speed: gone with the head" wait_for 10 is_unplugged

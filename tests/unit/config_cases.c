@@ -69,6 +69,9 @@ const struct bad bad[] = {
     {"heading_deg: 90", "name: \"a\\nb\"", 12, "stations[0].name", "control characters"},
     {"heading_deg: 90", "name: \"a\\0b\"", 12, "stations[0].name", "control characters"},
     {FRAMES_AT_4("serial: a,b"), 4, "head.serial", "without comma"},
+    {"type: tcp\n    port: 0", "type: usb\n    serial: \"a,b\"", 15, "links[0].serial", "without comma"},
+    {"type: tcp\n    port: 0", "type: usb\n    serial: Z\xc3\xbcrich", 15, "links[0].serial", "printable ASCII"},
+    {"type: tcp\n    port: 0", "type: usb\n    serial: 'a;b'", 15, "links[0].serial", "without comma"},
     /* keys */
     {PRR, "  prr: 500000\n", 3, "head.prr", "did you mean head.prr_hz?"},
     {PRR, "  pr_hz: 500000\n", 3, "head.pr_hz", "did you mean head.prr_hz?"},

@@ -197,13 +197,15 @@ static void a_protocol_fits_emitters_and_beams(void **state)
 {
     (void)state;
     const struct protocol_ops any = {.emitters = 0}, beams = {.emitters = 1u << EMITTER_BEAMS, .n_beams = 16};
-    const struct emitter sixteen = {.kind = EMITTER_BEAMS, .n_beams = 16}, two = {.kind = EMITTER_BEAMS, .n_beams = 2};
-    const struct emitter line = {.kind = EMITTER_LINE};
-    assert_true(cfg_protocol_fits(&any, &sixteen) && cfg_protocol_fits(&any, &line));
-    assert_true(cfg_protocol_fits(&beams, &sixteen));
-    assert_false(cfg_protocol_fits(&beams, &two) || cfg_protocol_fits(&beams, &line));
+    static const struct config_profile sixteen = {.emitter = {.kind = EMITTER_BEAMS, .n_beams = 16}},
+                                       two = {.emitter = {.kind = EMITTER_BEAMS, .n_beams = 2}},
+                                       line = {.emitter = {.kind = EMITTER_LINE}};
+    struct sh_err why;
+    assert_true(cfg_protocol_fits(&any, &sixteen, &why) && cfg_protocol_fits(&any, &line, &why));
+    assert_true(cfg_protocol_fits(&beams, &sixteen, &why));
+    assert_false(cfg_protocol_fits(&beams, &two, &why) || cfg_protocol_fits(&beams, &line, &why));
     const struct protocol_ops some = {.emitters = 1u << EMITTER_BEAMS | 1u << EMITTER_LINE, .n_beams = 16};
-    assert_true(cfg_protocol_fits(&some, &line) && !cfg_protocol_fits(&some, &two));
+    assert_true(cfg_protocol_fits(&some, &line, &why) && !cfg_protocol_fits(&some, &two, &why));
 }
 
 /* A sweep of the VZ-400i is 240 deg (facets 3, gain 2), of which 100 are used: its profile says so. */

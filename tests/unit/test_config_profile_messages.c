@@ -154,6 +154,59 @@ static void a_protocol_has_its_beams(void **state)
                 "velodyne has 16 beams, but head profile mine (line 2) has 2; allowed 16");
 }
 
+static const char other_sequence[] =
+    "another firing sequence; allowed is that of a VLP-16: clockwise, 55.296 us, with a "
+    "beam each 2.304 us, all at azimuth 0";
+static const struct {
+    const char *profile, *old, *with, *link, *has; /* NULL: it loads */
+} described[] = {
+    {"velodyne-vlp16", "firing_ns: { value: 55296", "firing_ns: { value: 60000", "{type: udp, protocol: velodyne}",
+     other_sequence},
+    {"velodyne-vlp16", "{ elevation_deg: 15,", "{ elevation_deg: 15, azimuth_deg: 1,",
+     "{type: udp, protocol: velodyne}", other_sequence},
+    {"velodyne-vlp16", "offset_ns: 2304,", "offset_ns: 2305,", "{type: udp, protocol: velodyne}", other_sequence},
+    {"velodyne-vlp16", "emitter: beams", "emitter: beams\nstep_direction: { value: counter-clockwise, from: quoted }",
+     "{type: udp, protocol: velodyne}", other_sequence},
+    {"velodyne-vlp16", "elevation_deg: 15,", "elevation_deg: 25,", "{type: udp, protocol: velodyne}", NULL},
+    {"velodyne-vlp16", "firing_ns: { value: 55296", "firing_ns: { value: 60000",
+     "{type: udp, protocol: velodyne-position}", NULL}, /* it says nothing of firings */
+    {"hokuyo-ust-10lx", "steps_per_turn: { value: 1440", "steps_per_turn: { value: 2880", "{type: tcp, protocol: scip}",
+     NULL},
+    {"hokuyo-ust-10lx", "steps_per_turn: { value: 1440", "steps_per_turn: { value: 2881", "{type: tcp, protocol: scip}",
+     "steps up to 1080 of 2881 a turn; allowed are 2880 a turn at most"},
+    {"sick-lms111", "{ lines_hz: 25, steps_per_turn: 720,", "{ lines_hz: 25, steps_per_turn: 72,",
+     "{type: tcp, protocol: cola}", NULL},
+    {"sick-lms111", "{ lines_hz: 25, steps_per_turn: 720,", "{ lines_hz: 25, steps_per_turn: 48,",
+     "{type: tcp, protocol: cola}", "48 steps a turn; allowed are 55 and more, of 6.5535 degrees at most"},
+};
+
+/* Configurations refuse the heads whose recordings replay refuses: firing times other than those of the formula in
+ * VELODYNE.md, more than 2880 steps (SCIP.md), steps of more than 6.5535 deg (CoLa), of any of the geometries. Beams may
+ * have any elevation, which clients read from a calibration file. */
+static void a_protocol_can_describe_the_head(void **state)
+{
+    (void)state;
+    for (size_t i = 0; i < sizeof described / sizeof *described; i++) {
+        char set[96], says[300];
+        snprintf(set, sizeof set, "links=[%s]", described[i].link);
+        const char *const sets[] = {set, "links.0.port=1", "time.epoch=utc", "output.layout=polar",
+                                    "stations[0]={position_m: [1, 2, 3], lat_deg: 1, lon_deg: 2, height_m: 3}"};
+        assert_loads(load_changed(described[i].profile, described[i].old, described[i].with));
+        const int code = load_sets(sets, sizeof sets / sizeof *sets);
+        if (described[i].has == NULL) {
+            assert_loads(code);
+            continue;
+        }
+        if (code != SH_EINPUT) fail_msg("row %zu was taken", i);
+        snprintf(says, sizeof says, "protocol %s does not support head profile mine (line 2), which has %s",
+                 strstr(described[i].link, "velodyne") != NULL ? "velodyne"
+                 : strstr(described[i].link, "scip") != NULL   ? "scip"
+                                                               : "cola",
+                 described[i].has);
+        expect_only("--set ", "links[0].protocol", says);
+    }
+}
+
 /* ---- the file's name and path */
 
 static void the_file_names_the_profile(void **state)
@@ -324,8 +377,9 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(profiles_are_refused_word_by_word), cmocka_unit_test(so_many_beams_fire_so_often),
         cmocka_unit_test(a_turn_has_a_firing_sequence),      cmocka_unit_test(a_protocol_has_its_beams),
-        cmocka_unit_test(the_file_names_the_profile),        cmocka_unit_test(the_longest_path_of_a_profile),
-        cmocka_unit_test(values_are_shown_safe_and_short),   cmocka_unit_test(sets_are_refused_word_by_word),
+        cmocka_unit_test(a_protocol_can_describe_the_head),  cmocka_unit_test(the_file_names_the_profile),
+        cmocka_unit_test(the_longest_path_of_a_profile),     cmocka_unit_test(values_are_shown_safe_and_short),
+        cmocka_unit_test(sets_are_refused_word_by_word),
     };
     return cmocka_run_group_tests_name("messages of head profiles", tests, set_up, tear_down);
 }

@@ -63,6 +63,23 @@ static void events_keep_their_order(void **state)
     assert_int_equal(work.n_events, 3);
 }
 
+/* Texts are printable ASCII (PROTOCOL.md), whatever names they have, and as long as the field (char[96]) with its NUL. */
+static void texts_are_ascii(void **state)
+{
+    (void)state;
+    char longest[120];
+    memset(longest, 'x', sizeof longest - 1);
+    longest[94] = (char)0xc3; /* a character across the end of the field */
+    longest[95] = (char)0xbc;
+    longest[sizeof longest - 1] = '\0';
+    device_push_event(&events, NATIVE_EV_SITE, 2, 0, 0, "Z\xc3\xbcrich ~\x1f\x7f");
+    device_push_error(&events, 0, NUMBER, longest);
+    expect_event(&events.event[0], NATIVE_EV_SITE, 2, 0, 0, "Z~~rich ~~~");
+    for (size_t i = 0; i < 95; i++)
+        assert_int_equal(events.event[1].text[i], i == 94 ? '~' : 'x');
+    assert_int_equal(events.event[1].text[95], '\0');
+}
+
 /* An event that finds no room is counted. The count is reported once there is room. */
 static void events_without_room_are_said(void **state)
 {
@@ -270,6 +287,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup(events_keep_their_order, begin),
+        cmocka_unit_test_setup(texts_are_ascii, begin),
         cmocka_unit_test_setup(events_without_room_are_said, begin),
         cmocka_unit_test_setup(the_eleventh_error_of_a_second_waits, begin),
         cmocka_unit_test_setup(a_second_ends_after_its_ticks, begin),

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* A gadget and its controller: plugging in and out, speeds and states as the kernel writes them
- * (ABI/stable/sysfs-class-udc), and the descriptions that FunctionFS gets (linux/usb/functionfs.h has the layout).
- * Bytes are written out by hand. */
+ * (ABI/stable/sysfs-class-udc), the descriptions that FunctionFS gets (linux/usb/functionfs.h has the layout), and
+ * gadgets of other containers. Bytes are written out by hand. */
 #include "tests/unit/configfs_rig.h"
 #include "tests/unit/usb_models.h"
 
@@ -9,7 +9,9 @@
 #include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "core/bytes.h"
@@ -265,10 +267,37 @@ static void test_refused_descriptions(void **state)
     gadget_remove(&gadget);
 }
 
+/* Locks a gadget as another process does. -1: it is locked. */
+static int lock(const char *path)
+{
+    const int fd = open(path, O_RDONLY | O_DIRECTORY);
+    if (flock(fd, LOCK_EX | LOCK_NB) == 0) return fd;
+    return close(fd), -1;
+}
+
+/* A container has its own numbers of processes, so a running head's gadget elsewhere seems left behind. Locks are the
+ * file system's, whoever looks (flock(2)), and end with their process: the gadget stays that long. */
+static void test_another_container(void **state)
+{
+    (void)state;
+    static const char path[] = CONFIGFS_GADGETS "/scanhead-99999999-1-5"; /* proc(5), pid_max: no process has it */
+    assert_int_equal(mkdir(path, 0755), 0);
+    const int fd = lock(path);
+    for (int runs = 1; runs >= 0; runs--) {
+        make();
+        assert_int_equal(access(path, F_OK) == 0, runs);
+        assert_int_equal(lock(gadget.dir), -1); /* it shows that it is in use */
+        gadget_remove(&gadget);
+        assert_int_equal(configfs_count(), runs);
+        if (runs) assert_int_equal(close(fd), 0);
+    }
+}
+
 int main(void)
 {
 #define TEST(name) cmocka_unit_test_setup_teardown(name, configfs_set_up, configfs_tear_down)
     const struct CMUnitTest tests[] = {TEST(test_plugging),
+                                       TEST(test_another_container),
                                        TEST(test_states),
                                        TEST(test_rates),
                                        TEST(test_description),

@@ -348,8 +348,8 @@ static void test_own_requests(void **state)
         unsigned type, request, value, index, length;
         int want;
     } cases[] = {
-        {0x21, 0x22, 2, 0, 0, 0}, /* RTS alone */
-        {0x21, 0x22, 3, 0, 0, 0},           {0x21, 0x22, 4, 0, 0, USB_STALL}, {0x21, 0x22, 1, 0, 1, USB_STALL},
+        {0x21, 0x22, 0xfffe, 0, 0, 0}, /* RTS alone, and reserved bits */
+        {0x21, 0x22, 3, 0, 0, 0},           {0x21, 0x22, 0, 0, 1, USB_STALL}, {0x21, 0x22, 1, 0, 1, USB_STALL},
         {0x21, 0x22, 1, 1, 0, USB_STALL},   {0x21, 0x23, 100, 0, 0, 0}, /* break */
         {0x21, 0x23, 100, 0, 1, USB_STALL}, {0x21, 0x20, 1, 0, 7, USB_STALL}, {0x21, 0x20, 0, 0, 6, USB_STALL},
         {0x21, 0x20, 0, 0, 8, USB_STALL},   {0xa1, 0x21, 1, 0, 7, USB_STALL}, {0xa1, 0x20, 0, 0, 7, USB_STALL},

@@ -56,6 +56,35 @@ static int is_put_out(int fd)
     return recv(fd, &byte, 1, MSG_DONTWAIT) == 0;
 }
 
+/* A host that hangs up gives the device back, also where more of its requests are unread than one turn takes (256), and
+ * where the next host's place comes first. Here each host hangs up before the next one sends its IMPORT, so no answer
+ * may be "busy" (status 2). */
+static void test_next_host(void **state)
+{
+    (void)state;
+    enum { REQUESTS = 600, ABRUPTLY = 1 };
+    static const uint8_t import[40] = {0x01, 0x11, 0x80, 0x03, 0, 0, 0, 0, '1', '-', '1'}, ok[8] = {0x01, 0x11, 0, 3};
+    static const struct {
+        int requests, abruptly;
+    } ways[] = {{0, 0}, {0, ABRUPTLY}, {REQUESTS, 0}};
+    for (size_t i = 0; i < sizeof ways / sizeof ways[0]; i++) {
+        struct bench bench = usbip_bench("N");
+        struct client host, next = {.bench = &bench, .fd = connect_silent(&bench)};
+        const struct linger reset = {ways[i].abruptly, 0};
+        uint8_t back[sizeof ok];
+        client_import(&host, &bench); /* in the second place */
+        for (int k = 0; k < ways[i].requests; k++)
+            client_unlink(&host, 1);
+        assert_int_equal(setsockopt(host.fd, SOL_SOCKET, SO_LINGER, &reset, sizeof reset), 0);
+        close(host.fd);
+        client_write(&next, import, sizeof import);
+        assert_true(client_read(&next, back, sizeof back));
+        assert_memory_equal(back, ok, sizeof ok);
+        close(next.fd);
+        bench_close(&bench);
+    }
+}
+
 /* There are four places. The client that has been here longest without importing makes room, wherever its place is. */
 static void test_oldest(void **state)
 {
@@ -286,12 +315,44 @@ static void test_bytes_pending(void **state)
     bench_close(&bench);
 }
 
+/* Up to 4096 requests may wait for the device (USB.md). A request on endpoint 0 and an UNLINK don't count among them:
+ * the protocol's documentation has an answer to each UNLINK. One more read cuts the client off. */
+static void test_requests_pending(void **state)
+{
+    (void)state;
+    enum { MOST = 4096 };
+    struct bench bench = usbip_bench("N");
+    struct client c;
+    uint8_t byte;
+    client_import(&c, &bench);
+    client_configure(&c);
+    client_open_stream(&c);
+    for (int i = 0; i < MOST; i++)
+        client_submit(&c, 1, 3, NULL, NULL, 512);
+    assert_int_equal(client_control(&c, &r, 0x80, GET_STATUS, 0, 0, 2, NULL), 0);
+    for (int waits = 0; waits < 2; waits++) { /* an answered one, and one that waits: the first read is number 3 */
+        const uint32_t unlink = client_unlink(&c, waits ? 3 : 1);
+        assert_true(client_reply(&c, &r, 0));
+        assert_int_equal(r.command, 4);
+        assert_int_equal(r.seqnum, unlink);
+        assert_int_equal(r.status, waits ? ECONNRESET_WIRE : 0);
+    }
+    client_submit(&c, 1, 3, NULL, NULL, 512);
+    assert_int_equal(client_control(&c, &r, 0x80, GET_STATUS, 0, 0, 2, NULL), 0);
+    client_submit(&c, 1, 3, NULL, NULL, 512);
+    assert_false(client_read(&c, &byte, 1));
+    bench_expect(&bench, LINK_CLOSED, 0);
+    bench_expect_notice(&bench, "the USB/IP host is cut off: more than 4096 requests");
+    close(c.fd);
+    bench_close(&bench);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_silent),        cmocka_unit_test(test_oldest),   cmocka_unit_test(test_pipelining),
-        cmocka_unit_test(test_turns),         cmocka_unit_test(test_segments), cmocka_unit_test(test_short_not_ok),
-        cmocka_unit_test(test_bytes_pending),
+        cmocka_unit_test(test_silent),        cmocka_unit_test(test_oldest),    cmocka_unit_test(test_pipelining),
+        cmocka_unit_test(test_turns),         cmocka_unit_test(test_segments),  cmocka_unit_test(test_short_not_ok),
+        cmocka_unit_test(test_bytes_pending), cmocka_unit_test(test_next_host), cmocka_unit_test(test_requests_pending),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -28,26 +28,51 @@ static void pending_urbs_have_a_limit(void **state)
     static struct usbip_urb *urb[MAX_PENDING];
     struct usbip_conn conn = {.fd = -1};
     for (int i = 0; i < MAX_PENDING; i++)
-        assert_non_null(urb[i] = usbip_urb_new(&conn, 0));
-    assert_null(usbip_urb_new(&conn, 0));
+        assert_non_null(urb[i] = usbip_urb_new(&conn, 3, 0));
+    assert_null(usbip_urb_new(&conn, 3, 0));
     usbip_urb_free(&conn, urb[0]);
-    assert_non_null(urb[0] = usbip_urb_new(&conn, 0));
-    assert_null(usbip_queue_plain(&conn, 8));
-    assert_int_equal(conn.broken, 1);
+    assert_non_null(urb[0] = usbip_urb_new(&conn, 3, 0));
     usbip_queue(&conn, urb[1], URB_HEADER);
-    assert_non_null(urb[1] = usbip_urb_new(&conn, 0));
-    assert_null(usbip_urb_new(&conn, 0));
+    assert_non_null(urb[1] = usbip_urb_new(&conn, 3, 0));
+    assert_null(usbip_urb_new(&conn, 3, 0));
     for (int i = 0; i < MAX_PENDING; i++)
         usbip_urb_free(&conn, urb[i]);
     usbip_queue_clear(&conn);
     expect_empty(&conn);
-    urb[0] = usbip_urb_new(&conn, MAX_PENDING_BYTES);
+    urb[0] = usbip_urb_new(&conn, 3, MAX_PENDING_BYTES);
     assert_non_null(urb[0]);
-    assert_null(usbip_urb_new(&conn, 1));
-    urb[1] = usbip_urb_new(&conn, 0);
+    assert_null(usbip_urb_new(&conn, 3, 1));
+    urb[1] = usbip_urb_new(&conn, 3, 0);
     assert_non_null(urb[1]);
     usbip_urb_free(&conn, urb[0]);
     usbip_urb_free(&conn, urb[1]);
+    expect_empty(&conn);
+}
+
+/* With as many URBs pending as there may be, the host can still end and mend transfers: replies that are no URB's have
+ * no limit, and requests on endpoint 0 have limits of their own. */
+static void a_host_at_the_limit_keeps_control(void **state)
+{
+    (void)state;
+    enum { ALL = MAX_PENDING + MORE_CONTROL };
+    static struct usbip_urb *urb[ALL];
+    struct usbip_conn conn = {.fd = -1};
+    for (int i = 0; i < ALL; i++)
+        assert_non_null(urb[i] = usbip_urb_new(&conn, i < MAX_PENDING ? 3 : 0,
+                                               i == 0            ? MAX_PENDING_BYTES
+                                               : i < MAX_PENDING ? 0
+                                                                 : 4096));
+    assert_null(usbip_urb_new(&conn, 0, 0));
+    assert_int_equal(conn.broken, 1);
+    conn.broken = 0;
+    assert_non_null(usbip_queue_plain(&conn, 8));
+    assert_non_null(usbip_queue_plain(&conn, 4096));
+    assert_int_equal(conn.broken, 0);
+    for (int i = 0; i < ALL; i++)
+        usbip_urb_free(&conn, urb[i]);
+    usbip_queue_clear(&conn);
+    expect_empty(&conn);
+    assert_null(usbip_urb_new(&conn, 0, MAX_PENDING_BYTES + MORE_CONTROL_BYTES + 1));
     expect_empty(&conn);
 }
 
@@ -116,6 +141,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(pending_urbs_have_a_limit),
+        cmocka_unit_test(a_host_at_the_limit_keeps_control),
         cmocka_unit_test(unsent_replies_have_a_limit),
         cmocka_unit_test(replies_are_sent_in_their_order),
     };

@@ -28,7 +28,7 @@ enum cfg_type {
 enum cfg_flags {
     CFG_FIGURE = 1,   /* written { value: V, from: data sheet|quoted|assumed }; source, note, definition may follow */
     CFG_HEX = 4,      /* written 0x1209, and only so: 1209 could be decimal or hexadecimal */
-    CFG_ASCII = 2,    /* goes into *IDN?: printable ASCII without comma, ';' and quotes */
+    CFG_ASCII = 2,    /* a name for clients, as in *IDN?: printable ASCII without comma, ';' and quotes */
     CFG_WRITTEN = 16, /* of CFG_PATH: the file is written; without this flag the file is read */
     CFG_NEEDED = 8,   /* has no default that suits most configurations: the example gives it a value */
     CFG_SPECIAL = 32, /* a list for some heads only: the example comments it out with all that is in it */

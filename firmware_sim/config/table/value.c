@@ -233,7 +233,7 @@ static int store_text(const struct place *at, char *dst, const char *text, const
         unsigned char c = (unsigned char)*p;
         if (c < 0x20 || c == 0x7f) return refuse(at, text, "text with control characters");
         if ((at->key->flags & CFG_ASCII) && (c >= 0x80 || strchr(",;\"'", c) != NULL))
-            return refuse(at, text, "text with a character that *IDN? can't carry");
+            return refuse(at, text, "text with a character that not all clients can carry");
     }
     const char *before = "";
     if (at->key->type == CFG_PATH && text[0] != '/') before = base_dir;
