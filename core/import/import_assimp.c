@@ -36,6 +36,8 @@ struct import {
     bool is_mirrored;         /* the levels mirror the mesh at hand */
     struct import_uv uv;      /* of the mesh at hand */
     unsigned n_turned;        /* meshes whose texture is turned */
+    unsigned n_boned;         /* meshes that bones move */
+    unsigned n_morphed;       /* meshes with morph targets */
     double largest;           /* |coordinate| at any level, file units */
     double error;             /* of a coordinate once it is placed, file units */
     uint64_t n_faces, n_done; /* for the progress */
@@ -202,6 +204,8 @@ static int label_of(struct import *im, const struct aiNode *node, const struct a
 static int add_mesh(struct import *im, const struct aiNode *node, const struct aiMesh *mesh, struct sh_err *err)
 {
     uint16_t label;
+    im->n_boned += mesh->mNumBones > 0; /* neither bones nor morph targets are applied */
+    im->n_morphed += mesh->mNumAnimMeshes > 0;
     im->b->mesh = mesh->mName.length > 0 ? mesh->mName.data : node->mName.data;
     int rc = label_of(im, node, mesh, &label, err);
     if (rc == SH_OK) rc = add_vertices(im, mesh, err);
@@ -252,6 +256,8 @@ static const struct aiScene *import_file(const struct assimp_lib *lib, struct sc
     lib->aiSetImportPropertyInteger(options, AI_CONFIG_IMPORT_COLLADA_USE_COLLADA_NAMES, 1); /* not the ids */
     lib->aiSetImportPropertyInteger(options, AI_CONFIG_IMPORT_IFC_SKIP_SPACE_REPRESENTATIONS,
                                     1); /* a space is the air of a room */
+    /* Assimp would make a body of each node of a file without a mesh. */
+    lib->aiSetImportPropertyInteger(options, AI_CONFIG_IMPORT_NO_SKELETON_MESHES, 1);
     const struct aiScene *in = lib->aiImportFileExWithProperties(b->spec->file, 0, &open.io, options);
     lib->aiReleasePropertyStore(options);
     lib->aiDetachLogStream(&stream);
@@ -293,6 +299,17 @@ static struct aiNode root_of(const struct aiScene *in, const char *file)
     return root;
 }
 
+/* The reader of glTF has warned of all this, with the file's own words. */
+static void warn_movers(const struct import *im)
+{
+    if (text_has_ending(im->b->spec->file, ".gltf") || text_has_ending(im->b->spec->file, ".glb")) return;
+    if (im->n_boned > 0)
+        build_warn(im->b, "the bones of %u meshes are not applied: these meshes are read as if they had none",
+                   im->n_boned);
+    if (im->n_morphed > 0)
+        build_warn(im->b, "the morph targets of %u meshes are not applied, whatever their weights", im->n_morphed);
+}
+
 int import_assimp(struct scene_build *b, struct sh_err *err)
 {
     struct import im = {.b = b};
@@ -311,6 +328,7 @@ int import_assimp(struct scene_build *b, struct sh_err *err)
     rc = add_node(&im, &root, 0, err);
     if (rc == SH_OK) rc = build_single(b, im.largest, im.error, true, err);
     if (rc == SH_OK && log.n > 0) build_warn(b, "%u warnings while it was read, the first: %s", log.n, log.first);
+    if (rc == SH_OK) warn_movers(&im);
     if (rc == SH_OK) import_say_colours(&im.lib, b, im.in);
     if (rc == SH_OK && im.n_turned > 0)
         build_warn(b, "the textures of %u meshes are rotated: they are read without the rotation", im.n_turned);

@@ -84,9 +84,9 @@ static void print_platform(const struct site *site, FILE *out)
     double way_m = 0.0;
     for (size_t i = 1; i < site->n_knots; i++)
         way_m += vec3_distance(site->knot[i].pose.position_m, site->knot[i - 1].pose.position_m);
-    fprintf(out, "platform  trajectory of %.3f s, %.3f m; %zu poses keep the head within %.3g m of it; %zu BVH\n",
+    fprintf(out, "platform  trajectory of %.3f s, %.3f m; %zu poses keep the head within %.3g m of it; %zu stretch%s\n",
             1e-9 * (double)site->knot[site->n_knots - 1].t_ns, way_m, site->n_knots, site->knot_error_m,
-            site->n_stretches);
+            site->n_stretches, site->n_stretches == 1 ? "" : "es");
 }
 
 static double bytes_of(const struct scene *scene, const struct bvh *bvh)

@@ -122,12 +122,9 @@ void device_replay_pose(struct device *device, const struct journal_entry *entry
 {
     double v[6];
     struct sh_err err;
-    int rc;
     memset(out, 0, sizeof *out);
-    if (pose_line_read(journal_pose(entry), v) != 0)
-        rc = sh_fail(&err, SH_EINPUT, "a pose is x y z roll pitch heading");
-    else
-        rc = take_pose(device, entry->t_ns, v, &err);
+    int rc = pose_line_read(journal_pose(entry), v, &err);
+    if (rc == SH_OK) rc = take_pose(device, entry->t_ns, v, &err);
     if (rc == SH_OK) return;
     out->error = CMD_E_SETTINGS;
     snprintf(out->reply, sizeof out->reply, "%.200s", err.text);

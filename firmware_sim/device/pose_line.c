@@ -8,38 +8,62 @@
 
 #include "firmware_sim/command/decimal.h"
 
-static const double most[7] = {1e9, 1e9, 1e9, 1e9, 360.0, 90.0, 360.0}; /* time, then the pose */
+enum { FIELDS = 7 };
 
-/* Reads the numbers from `first` on, of the seven that `most` has. */
-static int read_numbers(const char *line, int first, double *v)
+/* The time, then the pose. TIME:STEP has the same limits for its pose. */
+static const struct {
+    const char *name, *unit;
+    double most; /* of its absolute value */
+} field[FIELDS] = {{"t_s", "s", 1e9},      {"x", "m", 1e9},        {"y", "m", 1e9},          {"z", "m", 1e9},
+                   {"roll", "deg", 360.0}, {"pitch", "deg", 90.0}, {"heading", "deg", 360.0}};
+
+static int fail_form(int first, struct sh_err *err)
 {
+    return sh_fail(err, SH_EFORMAT, "a pose is not of the form %sx y z roll pitch heading", first == 0 ? "t_s " : "");
+}
+
+static int check_limit(int i, double value, struct sh_err *err)
+{
+    if (fabs(value) <= field[i].most) return SH_OK;
+    return sh_fail(err, SH_EINPUT, "%s of a pose is %.9g, allowed %.10g to %.10g %s", field[i].name, value,
+                   -field[i].most, field[i].most, field[i].unit);
+}
+
+/* Reads the numbers of all fields from `first` on. The limits come last, so that a line of another form is called that.
+ */
+static int read_numbers(const char *line, int first, double *v, struct sh_err *err)
+{
+    int rc = SH_OK;
     line += strspn(line, " \t");
-    for (int i = first; i < 7; i++) {
+    for (int i = first; i < FIELDS; i++) {
         struct command_decimal decimal;
         const char *end = command_parse_decimal(line, &decimal); /* after the number and its blanks */
-        if (end == NULL) return -1;
+        if (end == NULL) return fail_form(first, err);
         v[i - first] = command_decimal_to_double(&decimal);
-        if (!(fabs(v[i - first]) <= most[i])) return -1;
         const int apart = *end == ',' || end[-1] == ' ' || end[-1] == '\t';
-        if (i < 6 && !apart) return -1;
+        if (i + 1 < FIELDS && !apart) return fail_form(first, err);
         line = end;
-        if (i < 6 && *line == ',') line += 1 + strspn(line + 1, " \t");
+        if (i + 1 < FIELDS && *line == ',') line += 1 + strspn(line + 1, " \t");
     }
-    return line[strspn(line, " \t\r")] == '\0' ? 0 : -1;
+    if (line[strspn(line, " \t\r")] != '\0') return fail_form(first, err);
+    for (int i = first; i < FIELDS && rc == SH_OK; i++)
+        rc = check_limit(i, v[i - first], err);
+    return rc;
 }
 
-int pose_line_read(const char *line, double v[6])
+int pose_line_read(const char *line, double v[6], struct sh_err *err)
 {
-    return read_numbers(line, 1, v);
+    return read_numbers(line, 1, v, err);
 }
 
-int pose_line_read_timed(const char *line, double *t_s, double v[6])
+int pose_line_read_timed(const char *line, double *t_s, double v[6], struct sh_err *err)
 {
-    double all[7];
-    if (read_numbers(line, 0, all) != 0) return -1;
+    double all[FIELDS];
+    const int rc = read_numbers(line, 0, all, err);
+    if (rc != SH_OK) return rc;
     *t_s = all[0];
     memcpy(v, all + 1, 6 * sizeof *v);
-    return 0;
+    return SH_OK;
 }
 
 /* Prints the fewest digits that read back as the same number. */

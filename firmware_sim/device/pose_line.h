@@ -7,12 +7,14 @@
 
 #include <stddef.h>
 
+#include "core/err.h"
+
 enum { POSE_LINE_LEN = 192 };
 
-/* Read the whole line. 0, or -1 where it has another form, or a number beyond its limit: 1e9 s, 1e9 m, 90 degrees of
- * pitch, 360 of roll and heading. */
-int pose_line_read(const char *line, double v[6]);
-int pose_line_read_timed(const char *line, double *t_s, double v[6]);
+/* Read the whole line. SH_EFORMAT: it has another form. SH_EINPUT: a number is beyond its limit: 1e9 s, 1e9 m, 90 degrees
+ * of pitch, 360 of roll and heading. */
+int pose_line_read(const char *line, double v[6], struct sh_err *err);
+int pose_line_read_timed(const char *line, double *t_s, double v[6], struct sh_err *err);
 
 /* Writes the six numbers so that pose_line_read gives the same doubles. */
 void pose_line_write(const double v[6], char text[POSE_LINE_LEN]);

@@ -30,12 +30,12 @@ struct pose_feed {
     char text[DATAGRAM + 1];
 };
 
-static void report_bad(struct pose_feed *feed, const char *what)
+static void report_bad(struct pose_feed *feed, int number, const char *what)
 {
     int64_t now_ns = clock_now_ns();
     if (feed->reported_ns != 0 && now_ns - feed->reported_ns < 1000000000) return;
     feed->reported_ns = now_ns;
-    device_report(feed->device, CMD_E_DATA_TYPE, what);
+    device_report(feed->device, number, what);
 }
 
 static void pose_feed_take_line(struct pose_feed *feed, const char *line)
@@ -43,12 +43,12 @@ static void pose_feed_take_line(struct pose_feed *feed, const char *line)
     double t_s, v[6];
     struct sh_err err;
     if (line[strspn(line, " \t\r")] == '\0') return;
-    if (pose_line_read_timed(line, &t_s, v) != 0) {
+    int rc = pose_line_read_timed(line, &t_s, v, &err);
+    if (rc != SH_OK)
         atomic_fetch_add(&device_counters(feed->device)->bad_poses, 1);
-        report_bad(feed, "a pose is not of the form t_s x y z roll pitch heading");
-    } else if (device_pose(feed->device, llround(1e9 * t_s), v, &err) != SH_OK) {
-        report_bad(feed, err.text);
-    }
+    else
+        rc = device_pose(feed->device, llround(1e9 * t_s), v, &err); /* counts it, too */
+    if (rc != SH_OK) report_bad(feed, rc == SH_EFORMAT ? CMD_E_DATA_TYPE : CMD_E_RANGE, err.text);
 }
 
 static void take_datagram(struct pose_feed *feed)

@@ -154,9 +154,9 @@ static size_t gather(const struct site *site, size_t first, double centre_m[3], 
 static int add_stretch(struct site *site, const double centre_m[3], double reach_m, int64_t until_ns,
                        struct sh_err *err)
 {
-    if (site->n_stretches == CONFIG_MAX_STATIONS)
+    if (site->n_stretches == SITE_MAX_STRETCHES)
         return sh_fail(err, SH_EINPUT, "%s: platform: the path is too long; allowed %d stretches of %.0f m across",
-                       site->cfg->file, CONFIG_MAX_STATIONS, 2.0 * SITE_STRETCH_M);
+                       site->cfg->file, SITE_MAX_STRETCHES, 2.0 * SITE_STRETCH_M);
     if (!resize(&site->stretch, site->n_stretches + 1, sizeof *site->stretch))
         return sh_fail(err, SH_ENOMEM, "no memory for the path");
     struct site_stretch *stretch = &site->stretch[site->n_stretches++];

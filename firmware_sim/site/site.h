@@ -161,8 +161,10 @@ struct site {
     double scale_m;      /* of positions and ranges on the wire, metres per count */
 };
 
-/* A path is cut into stretches whose poses are within this distance of a centre. */
+/* A path is cut into stretches whose poses are within this distance of a centre. In the geo layout loading takes about
+ * 1 ms for each stretch, so the limit keeps it at 1 s. */
 #define SITE_STRETCH_M 1000.0
+enum { SITE_MAX_STRETCHES = 1024 };
 
 /* Extents are this many times the head's largest range, for noise. */
 #define SITE_MARGIN 1.01

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Materials of meshes that Assimp reads, on Collada: where texture coordinates lie, colours,
- * transparency, and what is said of the rest. And the functions through which Assimp reads files. */
+ * transparency, and what is said of the rest. Also what moves meshes (morph
+ * targets on FBX), and files without any. And the functions through which Assimp reads files. */
 #include <math.h>
 
 #include "core/import/import_open.h"
@@ -190,6 +191,103 @@ static void a_skew_is_refused(void **state)
     refuse("m.dae", changed, strlen(changed), "it has a <skew>, which Assimp can't read; allowed are <matrix>");
 }
 
+/* A tetrahedron of 1 m with a skin, whose joint is 7 m away. Slot: what the node draws. */
+static const char MOVED[] =
+    "<?xml version=\"1.0\"?><COLLADA xmlns=\"http://www.collada.org/2005/11/COLLADASchema\" version=\"1.4.1\">"
+    "<asset><unit meter=\"1\"/><up_axis>Y_UP</up_axis></asset><library_geometries><geometry id=\"g\"><mesh>"
+    "<source id=\"p\"><float_array id=\"pa\" count=\"12\">0 0 0 1 0 0 0 1 0 0 0 1</float_array><technique_common>"
+    "<accessor source=\"#pa\" count=\"4\" stride=\"3\"><param name=\"X\" type=\"float\"/>"
+    "<param name=\"Y\" type=\"float\"/><param name=\"Z\" type=\"float\"/></accessor></technique_common></source>"
+    "<vertices id=\"v\"><input semantic=\"POSITION\" source=\"#p\"/></vertices>"
+    "<triangles count=\"4\"><input semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/>"
+    "<p>0 2 1 0 1 3 0 3 2 1 2 3</p></triangles></mesh></geometry></library_geometries>"
+    "<library_controllers><controller id=\"c\"><skin source=\"#g\">"
+    "<source id=\"j\"><Name_array id=\"ja\" count=\"1\">J</Name_array><technique_common>"
+    "<accessor source=\"#ja\" count=\"1\"><param type=\"name\"/></accessor></technique_common></source>"
+    "<source id=\"b\"><float_array id=\"ba\" count=\"16\">1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1</float_array>"
+    "<technique_common><accessor source=\"#ba\" count=\"1\" stride=\"16\"><param type=\"float4x4\"/></accessor>"
+    "</technique_common></source>"
+    "<source id=\"w\"><float_array id=\"wa\" count=\"1\">1</float_array><technique_common>"
+    "<accessor source=\"#wa\" count=\"1\"><param type=\"float\"/></accessor></technique_common></source>"
+    "<joints><input semantic=\"JOINT\" source=\"#j\"/><input semantic=\"INV_BIND_MATRIX\" source=\"#b\"/></joints>"
+    "<vertex_weights count=\"4\"><input semantic=\"JOINT\" source=\"#j\" offset=\"0\"/>"
+    "<input semantic=\"WEIGHT\" source=\"#w\" offset=\"1\"/><vcount>1 1 1 1</vcount><v>0 0 0 0 0 0 0 0</v>"
+    "</vertex_weights></skin></controller></library_controllers>"
+    "<library_visual_scenes><visual_scene id=\"s\"><node id=\"n\">%s</node>"
+    "<node id=\"J\" sid=\"J\" type=\"JOINT\"><translate>0 7 0</translate></node></visual_scene></library_visual_scenes>"
+    "<scene><instance_visual_scene url=\"#s\"/></scene></COLLADA>";
+
+/* The tetrahedron with a morph target that lifts its top by 2 units, half of the way. Assimp reads morph targets of FBX
+ * alone. */
+static const char MORPH[] = "; FBX 7.3.0 project file\n"
+                            "FBXHeaderExtension: {\n"
+                            "FBXVersion: 7300\n"
+                            "}\n"
+                            "Objects: {\n"
+                            "Geometry: 1, \"Geometry::g\", \"Mesh\" {\n"
+                            "Vertices: *12 { a: 0,0,0,1,0,0,0,1,0,0,0,1 }\n"
+                            "PolygonVertexIndex: *12 { a: 0,2,-2,0,1,-4,0,3,-3,1,2,-4 }\n"
+                            "}\n"
+                            "Geometry: 2, \"Geometry::s\", \"Shape\" {\n"
+                            "Indexes: *1 { a: 3 }\n"
+                            "Vertices: *3 { a: 0,0,2 }\n"
+                            "Normals: *3 { a: 0,0,0 }\n"
+                            "}\n"
+                            "Model: 3, \"Model::n\", \"Mesh\" {\n"
+                            "}\n"
+                            "Deformer: 4, \"Deformer::d\", \"BlendShape\" {\n"
+                            "}\n"
+                            "Deformer: 5, \"SubDeformer::c\", \"BlendShapeChannel\" {\n"
+                            "DeformPercent: 50\n"
+                            "FullWeights: *1 { a: 100 }\n"
+                            "}\n"
+                            "}\n"
+                            "Connections: {\n"
+                            "C: \"OO\",3,0\n"
+                            "C: \"OO\",1,3\n"
+                            "C: \"OO\",4,1\n"
+                            "C: \"OO\",5,4\n"
+                            "C: \"OO\",2,5\n"
+                            "}\n";
+
+static void warn_of_movers(const char *name, const char *text, const char *warning)
+{
+    struct scene *s = load_text(name, text);
+    for (int k = 0; k < 3; k++)
+        assert_true(s->max_m[k] - s->min_m[k] == 1); /* the file's vertices, where they are */
+    const bool is_there = strstr(warnings, warning != NULL ? warning : "not applied") != NULL;
+    if (is_there != (warning != NULL)) fail_msg("%s", warnings);
+    scene_free(s);
+}
+
+static void bones_and_morph_targets_are_reported(void **state)
+{
+    (void)state;
+    static const char once[] = "<instance_controller url=\"#c\"><skeleton>#J</skeleton></instance_controller>";
+    char text[8192], twice[256];
+    snprintf(text, sizeof text, MOVED, "<instance_geometry url=\"#g\"/>");
+    warn_of_movers("m.dae", text, NULL);
+    snprintf(text, sizeof text, MOVED, once);
+    warn_of_movers("m.dae", text,
+                   "m.dae: the bones of 1 meshes are not applied: these meshes are read as if they had none");
+    snprintf(twice, sizeof twice, "%s%s", once, once);
+    snprintf(text, sizeof text, MOVED, twice);
+    warn_of_movers("m.dae", text, "the bones of 2 meshes are not applied");
+    warn_of_movers("m.fbx", MORPH, "m.fbx: the morph targets of 1 meshes are not applied, whatever their weights");
+}
+
+/* Assimp would make a body of each node, for those who want to see an animation alone. */
+static void a_file_without_a_mesh_has_no_bodies(void **state)
+{
+    (void)state;
+    static const char text[] =
+        "<?xml version=\"1.0\"?><COLLADA xmlns=\"http://www.collada.org/2005/11/COLLADASchema\" version=\"1.4.1\">"
+        "<asset><unit meter=\"1\"/><up_axis>Y_UP</up_axis></asset><library_visual_scenes><visual_scene id=\"v\">"
+        "<node id=\"a\"><translate>0 7 0</translate><node id=\"b\"><translate>5 0 0</translate></node></node>"
+        "</visual_scene></library_visual_scenes><scene><instance_visual_scene url=\"#v\"/></scene></COLLADA>";
+    refuse("m.dae", text, strlen(text), "it has no triangles");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -199,6 +297,8 @@ int main(void)
         cmocka_unit_test(files_are_read_anywhere),
         cmocka_unit_test(a_mirrored_node_keeps_its_outer_side),
         cmocka_unit_test(a_skew_is_refused),
+        cmocka_unit_test(bones_and_morph_targets_are_reported),
+        cmocka_unit_test(a_file_without_a_mesh_has_no_bodies),
     };
     return cmocka_run_group_tests_name("collada", tests, make_folder, remove_folder);
 }

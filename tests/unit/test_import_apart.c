@@ -102,6 +102,31 @@ static void gltf_of_old_gets_assimp_here(void **state)
     no_child_is_left();
 }
 
+/* Assimp reads no skins of glTF 1.0, and its scene does not show that there were some. A .glb has 20 bytes before its
+ * JSON. */
+static void skins_of_old_gltf_are_reported(void **state)
+{
+    (void)state;
+    static const char old[] = "{\"asset\":{\"version\":\"1.0\"},\"meshes\":{},\"skins\":{%s}}";
+    for (int k = 0; k < 4; k++) {
+        char text[160], glb[192];
+        struct scene *s;
+        struct sh_err err;
+        const uint32_t n = (uint32_t)snprintf(text, sizeof text, old, k % 2 == 0 ? "\"a\":{},\"b\":{}" : "");
+        const uint32_t head[4] = {1, 20 + n, n, 0};
+        memcpy(glb, "glTF", 4);
+        memcpy(glb + 4, head, sizeof head);
+        memcpy(glb + 20, text, n);
+        const char *file = k < 2 ? write_text("old.gltf", text) : write_file("old.glb", glb, 20 + n);
+        const struct scene_mesh_spec spec = {.file = file, .scale = 1};
+        assert_int_equal(load_spec(&spec, 1e-3, &s, &err), SH_EINPUT); /* it has no mesh */
+        unlink(path);
+        assert_int_equal(strstr(warnings, "it is glTF 1.0, so Assimp reads it, which ignores its 2 skins") != NULL,
+                         k % 2 == 0);
+    }
+    no_child_is_left();
+}
+
 enum { CHATTY = 1003 };
 
 static int warn_often(struct scene_build *b, struct sh_err *err)
@@ -404,11 +429,17 @@ static void child_dies_with_its_parent(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(hang_ends_in_time),          cmocka_unit_test(memory_is_limited),
-        cmocka_unit_test(crash_is_one_line),          cmocka_unit_test(child_has_limits),
-        cmocka_unit_test(child_dies_with_its_parent), cmocka_unit_test(signal_of_children_may_be_ignored),
-        cmocka_unit_test(no_descriptors_are_left),    cmocka_unit_test(gltf_of_old_gets_assimp_here),
-        cmocka_unit_test(warnings_are_counted),       cmocka_unit_test(limit_of_the_user_is_named),
+        cmocka_unit_test(hang_ends_in_time),
+        cmocka_unit_test(memory_is_limited),
+        cmocka_unit_test(crash_is_one_line),
+        cmocka_unit_test(child_has_limits),
+        cmocka_unit_test(child_dies_with_its_parent),
+        cmocka_unit_test(signal_of_children_may_be_ignored),
+        cmocka_unit_test(no_descriptors_are_left),
+        cmocka_unit_test(gltf_of_old_gets_assimp_here),
+        cmocka_unit_test(warnings_are_counted),
+        cmocka_unit_test(limit_of_the_user_is_named),
+        cmocka_unit_test(skins_of_old_gltf_are_reported),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -164,11 +164,16 @@ static void the_first_is_reported(void **state)
     static const struct {
         const char *lines, *says;
         uint64_t n; /* good ones */
-    } rows[] = {{"1.5 1 2 3 4 5\n1.6 1 2", "a pose is not of the form t_s x y z roll pitch heading", 0},
-                {"1.5 7 2 3 4 5 6\n1.6 9 9 9 4 5 6", "a pose is over 5 m from the station", 0},
-                {"1.5 0 0 0 0 0 0\n1.5 1 0 0 0 0 0", "a pose is not after the last pose, of 1.5 s", 1},
-                {"-0.5 0 0 0 0 0 0", "a pose is before power-up; allowed is 0 s on", 0},
-                {"3700 0 0 0 0 0 0", "a pose is over 3600 s ahead", 0}};
+    } rows[] = {
+        {"1.5 1 2 3 4 5\n1.6 1 2", "-104,\"Data type error; a pose is not of the form t_s x y z roll pitch heading", 0},
+        {"1.5 0 0 0 0 0 361", "-222,\"Data out of range; heading of a pose is 361, allowed -360 to 360 deg", 0},
+        {"1.5 0 0 0 0 -90.5 0", "pitch of a pose is -90.5, allowed -90 to 90 deg", 0},
+        {"1.5 0 0 0 361 0", "a pose is not of the form", 0},
+        {"2e9 0 0 0 0 0 0", "t_s of a pose is 2e+09, allowed -1000000000 to 1000000000 s", 0},
+        {"1.5 7 2 3 4 5 6\n1.6 9 9 9 4 5 6", "-222,\"Data out of range; a pose is over 5 m from the station", 0},
+        {"1.5 0 0 0 0 0 0\n1.5 1 0 0 0 0 0", "a pose is not after the last pose, of 1.5 s", 1},
+        {"-0.5 0 0 0 0 0 0", "a pose is before power-up; allowed is 0 s on", 0},
+        {"3700 0 0 0 0 0 0", "a pose is over 3600 s ahead", 0}};
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         struct command_result result;
         if (i > 0) begin(state);

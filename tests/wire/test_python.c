@@ -8,6 +8,11 @@
     " scene.anchor.source=explicit scene.anchor.lat_deg=" #lat " scene.anchor.lon_deg=" #lon \
     " scene.anchor.height_m=" #height " scene.anchor.north_deg=17"
 
+/* The scene is in a grid. */
+#define IN_UTM                                                                        \
+    " scene.anchor.source=utm scene.anchor.utm_zone=33 scene.anchor.hemisphere=north" \
+    " scene.meshes.0.offset_m=[391431,5819708,110] stations.0.position_m=[391431,5819708,110]"
+
 /* ---- every number of every point */
 
 struct __attribute__((packed)) row {
@@ -200,6 +205,9 @@ static void test_both_layouts(void **state)
         "output.crs=utm" AT(90, 12, 3),
         "output.crs=ecef" AT(-90, 12, 3),
         "output.crs=local",
+        "output.crs=utm" IN_UTM,
+        "output.crs=ecef" IN_UTM,
+        "output.crs=geodetic" IN_UTM,
     };
     need_python();
     room_write(wire);
@@ -219,7 +227,8 @@ static void test_both_layouts(void **state)
             fail_msg("%s: %g m in the CRS, %g m in the scene", places[i], crs_m, scene_m);
         /* The tangent is off by 81 / 2R = 6.4e-6 m, 9 m away. R is good to half a percent. At the height h of 2800 m
          * that is half a percent of 9 m h / R: 2.0e-5 m. */
-        if (!(page_m < 2.9e-5)) fail_msg("%s: the page's formula is %g m off", places[i], page_m);
+        const int is_tangent = strstr(places[i], "anchor.source=utm") == NULL; /* a scene in a grid is not metric */
+        if (is_tangent && !(page_m < 2.9e-5)) fail_msg("%s: the page's formula is %g m off", places[i], page_m);
     }
 }
 

@@ -2,7 +2,8 @@
 /* The file itself: JSON, alone or in a .glb, and its buffers.
  *
  *   .glb   "glTF" version length | length "JSON" ... | length "BIN\0" ... | others, which are skipped
- *          whole numbers of 32 bits, little-endian; chunks are padded to 4 bytes */
+ *          whole numbers of 32 bits, little-endian; chunks are padded to 4 bytes
+ *   1.0    "glTF" 1 length length-of-JSON 0 | JSON | the buffer; Assimp reads it */
 #include "core/import/gltf/gltf_file.h"
 
 #include <stdio.h>
@@ -17,7 +18,7 @@
 #include "core/import/gltf/gltf_nodes.h"
 #include "core/import/gltf/gltf_uri.h"
 
-enum { GLB_HEAD = 12, CHUNK_HEAD = 8, MAX_ENTRIES = 1 << 26 };
+enum { GLB_HEAD = 12, GLB_1_HEAD = 20, CHUNK_HEAD = 8, MAX_ENTRIES = 1 << 26 };
 #define CHUNK_JSON 0x4e4f534aU
 #define CHUNK_BIN  0x004e4942U
 
@@ -39,6 +40,25 @@ static int find_chunks(struct gltf *g, struct gltf_bytes *json)
     return json->p != NULL ? SH_OK : gltf_fail(g, "it has no JSON in it");
 }
 
+/* Assimp reads glTF 1.0 without its skins, and says nothing of them. root: NULL where the JSON is broken. */
+static void warn_skins(const struct gltf *g, const json_t *root)
+{
+    const size_t n = json_object_size(json_object_get(root, "skins"));
+    if (n > 0)
+        build_warn(g->b,
+                   "it is glTF 1.0, so Assimp reads it, which ignores its %zu skin%s; write it as glTF 2.0 for these",
+                   n, n > 1 ? "s" : "");
+}
+
+static void warn_skins_of_glb_1(const struct gltf *g)
+{
+    const struct text *t = &g->file;
+    if (t->size < GLB_1_HEAD || le_get32(t->data + GLB_HEAD) > t->size - GLB_1_HEAD) return;
+    json_t *root = json_loadb(t->data + GLB_1_HEAD, le_get32(t->data + GLB_HEAD), JSON_DECODE_INT_AS_REAL, NULL);
+    warn_skins(g, root);
+    json_decref(root);
+}
+
 static int find_json(struct gltf *g, struct gltf_bytes *json)
 {
     const struct text *t = &g->file;
@@ -49,6 +69,7 @@ static int find_json(struct gltf *g, struct gltf_bytes *json)
     }
     const uint32_t version = le_get32(t->data + 4);
     g->by_assimp = version == 1;
+    if (version == 1) warn_skins_of_glb_1(g);
     if (version == 1 || version == 2) return version == 1 ? SH_OK : find_chunks(g, json);
     return gltf_fail(g, "it is a .glb of version %u; allowed are 1 and 2", version);
 }
@@ -60,7 +81,10 @@ static int check_version(struct gltf *g)
     const char *version = gltf_text(asset, "version"), *least = gltf_text(asset, "minVersion");
     g->by_assimp = (version != NULL && strncmp(version, "1.", 2) == 0) ||
                    (version == NULL && json_is_object(json_object_get(g->root, "meshes")));
-    if (g->by_assimp) return SH_OK;
+    if (g->by_assimp) {
+        warn_skins(g, g->root);
+        return SH_OK;
+    }
     if (version == NULL || strncmp(version, "2.", 2) != 0)
         return gltf_fail(g, "asset.version is %.20s; allowed are 1.0 and 2.x", version != NULL ? version : "not there");
     if (least != NULL && strcmp(least, "2.0") != 0)

@@ -1012,7 +1012,7 @@ class _Earth:
     def __init__(self, anchor: Dict, layout: int) -> None:
         self.crs, self.station_m = anchor["crs"], anchor["station_m"]
         self.same = self.crs == CRS_LOCAL
-        self.geoid_m = 0.0
+        self.geoid_m = self.lift_m = 0.0
         if self.same:
             return
         place = anchor["lat_deg"], anchor["lon_deg"], anchor["height_m"]
@@ -1022,8 +1022,9 @@ class _Earth:
             self.geoid_m = place[2] - anchor["anchor"][2]
         grid = _grid_of(self.station_m, *place[:2])
         self.same = grid is not None and grid == anchor["epsg"]
-        if grid is not None and not self.same:
-            raise ScanheadError(f"the scene is in the grid of EPSG {grid}; take output.layout geo")
+        self.own = _Grid(grid) if grid is not None else None
+        if self.own is not None:
+            self.lift_m = self.station_m[2] - place[2]  # a scene in a grid has heights that differ by this
         self.grid = _Grid(anchor["epsg"]) if self.crs == CRS_UTM else None
         self.home = geodetic_to_ecef(*place)
         self.turn = self._rotation(anchor)
@@ -1044,22 +1045,31 @@ class _Earth:
 
     def forward(self, x_m, y_m, z_m, m):
         if self.same:
-            return x_m, y_m, z_m - self.geoid_m
-        d = _apply(self.turn, (x_m - self.station_m[0], y_m - self.station_m[1], z_m - self.station_m[2]))
-        at = tuple(h + v for h, v in zip(self.home, d))
-        if self.crs == CRS_ECEF:
-            return at
-        lat_deg, lon_deg, height_m = ecef_to_geodetic(*at, m)
+            return x_m, y_m, z_m - self.lift_m - self.geoid_m
+        if self.own is not None:
+            lat_deg, lon_deg = self.own.inverse(x_m, y_m, m)
+            height_m = z_m - self.lift_m
+            if self.crs == CRS_ECEF:
+                return geodetic_to_ecef(lat_deg, lon_deg, height_m, m)
+        else:
+            d = _apply(self.turn, (x_m - self.station_m[0], y_m - self.station_m[1], z_m - self.station_m[2]))
+            at = tuple(h + v for h, v in zip(self.home, d))
+            if self.crs == CRS_ECEF:
+                return at
+            lat_deg, lon_deg, height_m = ecef_to_geodetic(*at, m)
         if self.grid is not None:
             lat_deg, lon_deg = self.grid.forward(lat_deg, lon_deg, m)
         return lat_deg, lon_deg, height_m - self.geoid_m
 
     def inverse(self, x, y, z, m):
         if self.same:
-            return x, y, z + self.geoid_m
+            return x, y, z + self.lift_m + self.geoid_m
         if self.crs != CRS_ECEF:
             lat_deg, lon_deg = self.grid.inverse(x, y, m) if self.grid is not None else (x, y)
             x, y, z = geodetic_to_ecef(lat_deg, lon_deg, z + self.geoid_m, m)
+        if self.own is not None:
+            lat_deg, lon_deg, height_m = ecef_to_geodetic(x, y, z, m)
+            return (*self.own.forward(lat_deg, lon_deg, m), height_m + self.lift_m)
         d = _apply_transposed(self.turn, (x - self.home[0], y - self.home[1], z - self.home[2]))
         return tuple(s + v for s, v in zip(self.station_m, d))
 
