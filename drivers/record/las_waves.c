@@ -28,12 +28,18 @@ int las_waves_check(const char *path, struct sh_err *err)
     return rc;
 }
 
-static int put_head(struct las_waves *w, struct sh_err *err)
+void las_waves_head(uint8_t head[LAS_WAVES_HEAD_LEN])
 {
-    uint8_t head[LAS_WAVES_HEAD_LEN] = {0};
+    memset(head, 0, LAS_WAVES_HEAD_LEN);
     memcpy(head + 2, "LASF_Spec", 9);
     le_put16(head + 18, LAS_WAVES_RECORD);
     memcpy(head + 28, "waveform data packets", 21);
+}
+
+static int put_head(struct las_waves *w, struct sh_err *err)
+{
+    uint8_t head[LAS_WAVES_HEAD_LEN];
+    las_waves_head(head);
     return outfile_write(&w->file, head, sizeof head, err);
 }
 

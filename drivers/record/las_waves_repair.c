@@ -26,14 +26,27 @@ static int packets_open(struct las_packets *p, int is_part, struct sh_err *err)
     return rc;
 }
 
-/* A completed record says its length. A record that is being written says 0. */
-static int read_len(struct las_packets *p, struct sh_err *err)
+static int fail_head(const struct las_packets *p, const struct repair *r, struct sh_err *err)
 {
-    uint8_t at[8];
-    if (p->len < LAS_WAVES_HEAD_LEN) return SH_OK;
-    const int rc = repair_read(&p->file, p->begin + LAS_WAVES_LEN_AT, at, sizeof at, err);
-    if (rc == SH_OK && le_get64(at) <= p->len - LAS_WAVES_HEAD_LEN) p->end = LAS_WAVES_HEAD_LEN + le_get64(at);
-    return rc;
+    if (is_inside(p)) return repair_fail_damaged(r, p->begin, err);
+    return sh_fail(err, SH_EFORMAT, "%s: holds no waveforms of scanhead; put that of %s there; both are unchanged",
+                   p->path, r->path);
+}
+
+/* Checks the head of the record, as far as it is there: any file may have the name X.wdp. A completed record says its
+ * length. A record that is being written says 0. */
+static int read_head(struct las_packets *p, const struct repair *r, struct sh_err *err)
+{
+    uint8_t is[LAS_WAVES_HEAD_LEN], head[LAS_WAVES_HEAD_LEN];
+    const size_t n = p->len < sizeof is ? (size_t)p->len : sizeof is;
+    const int rc = repair_read(&p->file, p->begin, is, n, err);
+    if (rc != SH_OK) return rc;
+    las_waves_head(head);
+    if (n > LAS_WAVES_LEN_AT) memcpy(head + LAS_WAVES_LEN_AT, is + LAS_WAVES_LEN_AT, n < 28 ? n - LAS_WAVES_LEN_AT : 8);
+    if (memcmp(is, head, n) != 0) return fail_head(p, r, err);
+    const uint64_t len = le_get64(head + LAS_WAVES_LEN_AT);
+    if (n == sizeof is && len <= p->len - n) p->end = n + len;
+    return SH_OK;
 }
 
 /* Cuts .part from the .las's name. Returns 1 where the name that is left is free: the file will get it. */
@@ -71,7 +84,7 @@ static int find_outside(struct las_packets *p, const struct repair *r, struct sh
     free(las);
     p->file.path = p->path;
     if (rc == SH_OK) rc = packets_open(p, is_part, err);
-    return rc == SH_OK ? read_len(p, err) : rc;
+    return rc == SH_OK ? read_head(p, r, err) : rc;
 }
 
 /* Checks where the header says that the packets are. Inside the file, their record begins where a point ends. The
@@ -97,7 +110,7 @@ int las_packets_find(struct las_packets *p, const struct repair *r, const uint8_
     if (p->begin == 0) return SH_OK;
     p->file = *r;
     p->len = r->len > p->begin ? r->len - p->begin : 0;
-    return read_len(p, err);
+    return read_head(p, r, err);
 }
 
 uint64_t las_packets_limit(const struct las_packets *p, const struct repair *r, const uint8_t *header)
@@ -155,6 +168,18 @@ static int set_len(struct las_packets *p, struct sh_err *err)
     return rc == SH_OK ? 1 : rc;
 }
 
+/* A .las with its final name was whole beside its .wdp. So a .wdp that is too short for it is a piece, or that of
+ * another recording: the points keep their references, which they need for the right one. */
+static int check_whole(const struct las_packets *p, const struct repair *r, struct sh_err *err)
+{
+    const int is_short = p->n_without > 0 || p->len < LAS_WAVES_HEAD_LEN;
+    if (is_inside(p) || repair_is_part(r) || p->len == 0 || !is_short) return SH_OK;
+    return sh_fail(err, SH_EFORMAT,
+                   "%s: is shorter than the points of %s need: put the right one there; or an empty file of that name, "
+                   "to keep the points alone; both are unchanged",
+                   p->path, r->path);
+}
+
 /* Not even the head of the record is there, so no point has a packet. */
 static void leave_out_record(uint8_t *header)
 {
@@ -165,8 +190,9 @@ static void leave_out_record(uint8_t *header)
 int las_packets_repair(struct las_packets *p, struct repair *r, const struct repair_rows *points, uint8_t *header,
                        struct sh_err *err)
 {
-    int rc = clear_points(p, r, points, err), changed = p->n_without > 0 || p->len > p->end;
-    if (p->n_without > 0)
+    int rc = check_whole(p, r, err), changed = p->n_without > 0 || p->len > p->end;
+    if (rc == SH_OK) rc = clear_points(p, r, points, err);
+    if (rc == SH_OK && p->n_without > 0)
         sh_warn(r->report, "%s: %llu points have no waveform: it did not reach the disk", r->path,
                 (unsigned long long)p->n_without);
     if (rc == SH_OK && p->len < LAS_WAVES_HEAD_LEN) {

@@ -294,6 +294,96 @@ static void test_refused(void **state)
     }
 }
 
+static void put_int(struct bytes *b, size_t at, uint64_t v, int n_bytes)
+{
+    for (int i = 0; i < n_bytes; i++)
+        b->data[at + (size_t)i] = (uint8_t)(v >> 8 * i);
+}
+
+/* The whole recording with --wdp, made of the one with packets inside. */
+static struct bytes las_outside(void)
+{
+    struct bytes b = {malloc(whole.len), front_of(&whole) + 2 * N * POINT};
+    memcpy(b.data, whole.data, whole.len);
+    put_int(&b, 6, 1 << 4 | 1 << 2, 2);
+    put_int(&b, 227, 0, 8); /* where the record of packets begins, */
+    put_int(&b, 235, 0, 8); /* where extended records begin, */
+    put_int(&b, 243, 0, 4); /* and how many they are */
+    return b;
+}
+
+/* The .las at las_path has a .wdp of these bytes beside it, which is not its own: the repair changes neither file. */
+static void check_untouched(const char *las_path, const char *wdp_path, const void *packets, size_t len)
+{
+    const struct bytes before = repair_slurp(las_path);
+    struct repaired file;
+    repair_write_file(wdp_path, packets, len);
+    assert_int_equal(repair_file(las_path, NULL, &file, &repair_err), SH_EFORMAT);
+    assert_ptr_equal(strstr(repair_err.text, wdp_path), repair_err.text);
+    assert_non_null(strstr(repair_err.text, "unchanged"));
+    const struct bytes las = repair_slurp(las_path), is = repair_slurp(wdp_path);
+    assert_int_equal(las.len, before.len);
+    assert_memory_equal(las.data, before.data, las.len);
+    assert_int_equal(is.len, len);
+    assert_memory_equal(is.data, packets, len);
+    free(before.data);
+    free(las.data);
+    free(is.data);
+    unlink(wdp_path);
+}
+
+/* Any file can have the name X.wdp. Only a record of packets that is long enough belongs to X.las. */
+static void test_foreign_wdp(void **state)
+{
+    (void)state;
+    static uint8_t text[5000], zeros[100];
+    struct bytes las = las_outside();
+    const size_t first = (size_t)rig_uint(whole.data + 227, 8);
+    const struct bytes packets = {whole.data + first, whole.len - first};
+    struct repaired file;
+    memset(text, '1', sizeof text);
+    repair_write_file(repair_path, las.data, las.len);
+    check_untouched(repair_path, wdp, text, sizeof text);
+    check_untouched(repair_path, wdp, text, 91);
+    check_untouched(repair_path, wdp, text, 1);
+    check_untouched(repair_path, wdp, zeros, sizeof zeros);
+    check_untouched(repair_path, wdp, packets.data, packets.len - 1); /* a piece of the right one */
+    check_untouched(repair_path, wdp, packets.data, EVLR - 1);
+    repair_write_file(wdp, packets.data, packets.len); /* the right one completes it */
+    assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), 0);
+    assert_true(file.was_whole);
+    repair_free(&file);
+    unlink(wdp);
+    repair_write_file(wdp, "", 0); /* an empty one keeps the points alone */
+    assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), 0);
+    assert_int_equal(file.n_kept, 2 * N);
+    repair_free(&file);
+    unlink(repair_path);
+    unlink(wdp);
+    repair_write_file(repair_part, left.data, left.len);
+    check_untouched(repair_part, wdp_part, text, sizeof text);
+    unlink(repair_part);
+    free(las.data);
+}
+
+/* The record inside a .las has a head, too. */
+static void test_foreign_inside(void **state)
+{
+    (void)state;
+    struct repaired file;
+    struct bytes las = {malloc(whole.len), whole.len};
+    memcpy(las.data, whole.data, whole.len);
+    const size_t first = (size_t)rig_uint(whole.data + 227, 8);
+    char want[80];
+    las.data[first + 2] = 'l';
+    repair_write_file(repair_path, las.data, las.len);
+    assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), SH_EFORMAT);
+    snprintf(want, sizeof want, "is damaged at byte %zu", first);
+    assert_non_null(strstr(repair_err.text, want));
+    unlink(repair_path);
+    free(las.data);
+}
+
 /* A limit on the files' size stands for a full disk. The rest is repaired: so many points, so many of them with
  * packets. */
 static void check_full(rlim_t size, uint16_t n_samples, const char *names, size_t n_points, size_t n_packets)
@@ -348,8 +438,10 @@ static void test_no_room_for_copy(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_cut),     cmocka_unit_test(test_cut_copy),  cmocka_unit_test(test_cut_inside),
-        cmocka_unit_test(test_refused), cmocka_unit_test(test_disk_full), cmocka_unit_test(test_no_room_for_copy),
+        cmocka_unit_test(test_cut),         cmocka_unit_test(test_cut_copy),
+        cmocka_unit_test(test_cut_inside),  cmocka_unit_test(test_refused),
+        cmocka_unit_test(test_foreign_wdp), cmocka_unit_test(test_foreign_inside),
+        cmocka_unit_test(test_disk_full),   cmocka_unit_test(test_no_room_for_copy),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
