@@ -57,7 +57,31 @@ static int will_be_renamed(const struct repair *r, char *las)
     return !repair_exists(las);
 }
 
-static int find_outside(struct las_packets *p, const struct repair *r, struct sh_err *err)
+/* Returns 1 where a .part's packets may have the name X.wdp already: the header is that of a completed file, or a repair
+ * was interrupted, which counts the points and renames X.wdp.part only where X.las is free. Else X.wdp is that of an
+ * older recording. */
+static int may_be_final(const uint8_t *header, int is_renamed)
+{
+    const int is_complete = strcmp((const char *)header + LAS_SOFTWARE_AT, LAS_SOFTWARE) == 0;
+    return is_complete || (is_renamed && le_get64(header + LAS_POINTS_AT) != 0);
+}
+
+/* *is_part: which of both names the packets have. */
+static int choose_name(const struct repair *r, const uint8_t *header, int is_renamed, const char *wdp, const char *part,
+                       int *is_part, struct sh_err *err)
+{
+    *is_part = repair_is_part(r) && repair_exists(part);
+    if (*is_part && is_renamed && repair_exists(wdp))
+        return sh_fail(err, SH_ESTATE, "%s: %s exists, and is not replaced; move it away, and repeat the command", part,
+                       wdp);
+    if (*is_part || (repair_exists(wdp) && (!repair_is_part(r) || may_be_final(header, is_renamed)))) return SH_OK;
+    return sh_fail(err, SH_EINPUT,
+                   "%s: its waveforms are not there: put %s beside it; or an empty file of that name, to keep the "
+                   "points alone",
+                   r->path, repair_is_part(r) ? part : wdp);
+}
+
+static int find_outside(struct las_packets *p, const struct repair *r, const uint8_t *header, struct sh_err *err)
 {
     char *las = strdup(r->path), *part = NULL;
     const int is_renamed = las != NULL && will_be_renamed(r, las);
@@ -67,15 +91,7 @@ static int find_outside(struct las_packets *p, const struct repair *r, struct sh
         part = NULL;
         rc = sh_fail(err, SH_ENOMEM, "%s: no memory to repair it", r->path);
     } else {
-        is_part = repair_is_part(r) && repair_exists(part);
-        if (is_part && is_renamed && repair_exists(wdp))
-            rc = sh_fail(err, SH_ESTATE, "%s: %s exists, and is not replaced; move it away, and repeat the command",
-                         part, wdp);
-        else if (!is_part && !repair_exists(wdp))
-            rc = sh_fail(err, SH_EINPUT,
-                         "%s: its waveforms are not there: put %s beside it; or an empty file of that name, to keep "
-                         "the points alone",
-                         r->path, repair_is_part(r) ? part : wdp);
+        rc = choose_name(r, header, is_renamed, wdp, part, &is_part, err);
     }
     p->path = is_part ? part : wdp;
     p->target = is_part && is_renamed ? wdp : NULL;
@@ -106,7 +122,7 @@ int las_packets_find(struct las_packets *p, const struct repair *r, const uint8_
     p->begin = le_get64(header + LAS_WAVES_AT);
     const int rc = check_place(r, header, err);
     if (rc != SH_OK) return rc;
-    if ((header[LAS_ENCODING_AT] & LAS_WAVES_OUTSIDE) != 0) return find_outside(p, r, err);
+    if ((header[LAS_ENCODING_AT] & LAS_WAVES_OUTSIDE) != 0) return find_outside(p, r, header, err);
     if (p->begin == 0) return SH_OK;
     p->file = *r;
     p->len = r->len > p->begin ? r->len - p->begin : 0;

@@ -366,6 +366,52 @@ static void test_foreign_wdp(void **state)
     free(las.data);
 }
 
+/* The repair of .part fails, since its packets are not there, and changes nothing. */
+static void check_not_there(const void *packets, size_t len)
+{
+    struct repaired file;
+    assert_int_equal(repair_file(repair_part, NULL, &file, &repair_err), SH_EINPUT);
+    assert_non_null(strstr(repair_err.text, wdp_part));
+    const struct bytes is = repair_slurp(wdp);
+    assert_int_equal(left_len(repair_part), left.len);
+    assert_int_equal(is.len, len);
+    assert_memory_equal(is.data, packets, len);
+    free(is.data);
+}
+
+/* X.wdp of an older recording is not that of X.las.part. It is that of a .part that is complete, or whose repair was
+ * interrupted. */
+static void test_older_wdp(void **state)
+{
+    (void)state;
+    struct bytes las = las_outside();
+    const uint8_t *packets = whole.data + rig_uint(whole.data + 227, 8);
+    const size_t len = whole.len - (size_t)rig_uint(whole.data + 227, 8);
+    struct repaired file;
+    repair_write_file(wdp, packets, len);
+    repair_write_file(repair_part, left.data, left.len);
+    check_not_there(packets, len); /* also where X.las was removed */
+    repair_write_file(repair_path, las.data, las.len);
+    check_not_there(packets, len);
+    memcpy(las.data + 58, "scanhead, its end is missing", 29);
+    repair_write_file(repair_part, las.data, left.len);
+    check_not_there(packets, len);
+    unlink(repair_path); /* an interrupted repair found this name free */
+    assert_int_equal(repair_file(repair_part, NULL, &file, &repair_err), 0);
+    assert_int_equal(file.n_kept, 2 * N);
+    repair_free(&file);
+    memset(las.data + 58, 0, 32);
+    memcpy(las.data + 58, "scanhead", 8);
+    repair_write_file(repair_part, las.data, las.len); /* killed as it was renamed, with the older file still there */
+    assert_int_equal(repair_file(repair_part, NULL, &file, &repair_err), 0);
+    assert_true(file.was_whole && file.is_part);
+    repair_free(&file);
+    unlink(repair_path);
+    unlink(repair_part);
+    unlink(wdp);
+    free(las.data);
+}
+
 /* The record inside a .las has a head, too. */
 static void test_foreign_inside(void **state)
 {
@@ -438,10 +484,9 @@ static void test_no_room_for_copy(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_cut),         cmocka_unit_test(test_cut_copy),
-        cmocka_unit_test(test_cut_inside),  cmocka_unit_test(test_refused),
-        cmocka_unit_test(test_foreign_wdp), cmocka_unit_test(test_foreign_inside),
-        cmocka_unit_test(test_disk_full),   cmocka_unit_test(test_no_room_for_copy),
+        cmocka_unit_test(test_cut),       cmocka_unit_test(test_cut_copy),    cmocka_unit_test(test_cut_inside),
+        cmocka_unit_test(test_refused),   cmocka_unit_test(test_foreign_wdp), cmocka_unit_test(test_foreign_inside),
+        cmocka_unit_test(test_older_wdp), cmocka_unit_test(test_disk_full),   cmocka_unit_test(test_no_room_for_copy),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }
