@@ -33,19 +33,34 @@ static int fail_head(const struct las_packets *p, const struct repair *r, struct
                    p->path, r->path);
 }
 
+/* A power cut may leave zeros at the end of a file that was not completed. Where they reach into the head, that head
+ * counts as cut. */
+static int find_zeros(struct las_packets *p, const struct repair *r, struct sh_err *err)
+{
+    static const uint64_t HEAD_TEXT_END = 49; /* zeros follow in each head */
+    const uint64_t end = p->begin + p->len;
+    int rc = SH_OK;
+    p->zeros_at = end;
+    if (repair_is_part(r)) rc = repair_find_zeros(&p->file, p->begin, end, &p->zeros_at, err);
+    p->zeros_at -= p->begin;
+    if (p->zeros_at < HEAD_TEXT_END) p->len = p->zeros_at;
+    return rc;
+}
+
 /* Checks the head of the record, as far as it is there: any file may have the name X.wdp. A completed record says its
  * length. A record that is being written says 0. */
 static int read_head(struct las_packets *p, const struct repair *r, struct sh_err *err)
 {
     uint8_t is[LAS_WAVES_HEAD_LEN], head[LAS_WAVES_HEAD_LEN];
+    int rc = find_zeros(p, r, err);
     const size_t n = p->len < sizeof is ? (size_t)p->len : sizeof is;
-    const int rc = repair_read(&p->file, p->begin, is, n, err);
+    if (rc == SH_OK) rc = repair_read(&p->file, p->begin, is, n, err);
     if (rc != SH_OK) return rc;
     las_waves_head(head);
     if (n > LAS_WAVES_LEN_AT) memcpy(head + LAS_WAVES_LEN_AT, is + LAS_WAVES_LEN_AT, n < 28 ? n - LAS_WAVES_LEN_AT : 8);
     if (memcmp(is, head, n) != 0) return fail_head(p, r, err);
     const uint64_t len = le_get64(head + LAS_WAVES_LEN_AT);
-    if (n == sizeof is && len <= p->len - n) p->end = n + len;
+    if (n == sizeof is && len <= p->len - n && p->zeros_at == p->len) p->end = n + len;
     return SH_OK;
 }
 
@@ -137,23 +152,34 @@ uint64_t las_packets_limit(const struct las_packets *p, const struct repair *r, 
     return n != 0 && n < (r->len - front) / len ? front + n * len : r->len;
 }
 
-/* Returns 1 if the point's record refers to a packet; *end is that packet's end. */
-static int refers(const struct las_packets *p, const uint8_t *record, uint64_t *end)
+struct reference {
+    uint64_t at, end;
+};
+
+/* Returns 1 if the point's record refers to a packet. */
+static int refers(const struct las_packets *p, const uint8_t *record, struct reference *packet)
 {
     const uint8_t *wave = record + p->wave_at;
     const uint64_t at = le_get64(wave + 1);
-    *end = at <= UINT64_MAX - UINT32_MAX ? at + le_get32(wave + 9) : UINT64_MAX;
+    *packet = (struct reference){at, at <= UINT64_MAX - UINT32_MAX ? at + le_get32(wave + 9) : UINT64_MAX};
     return wave[0] != 0;
+}
+
+/* Where zeros begin within a packet and go on after it, the rest of its samples is lost. */
+static int is_there(const struct las_packets *p, const struct reference *packet)
+{
+    if (packet->end == p->len) return packet->at < p->zeros_at;
+    return packet->end <= p->zeros_at;
 }
 
 void las_packets_take(struct las_packets *p, const uint8_t *record)
 {
-    uint64_t end;
-    if (!refers(p, record, &end)) return;
-    if (end > p->len)
+    struct reference packet;
+    if (!refers(p, record, &packet)) return;
+    if (!is_there(p, &packet))
         p->n_without++;
-    else if (end > p->end)
-        p->end = end;
+    else if (packet.end > p->end)
+        p->end = packet.end;
 }
 
 /* Packets are written in the order of points, and before them. So only the last points may lack theirs. */
@@ -161,12 +187,13 @@ static int clear_points(struct las_packets *p, struct repair *r, const struct re
 {
     static const uint8_t none[LAS_WAVE_LEN];
     uint8_t record[LAS_POINT_LEN_MAX];
-    uint64_t left = p->n_without, end;
+    struct reference packet;
+    uint64_t left = p->n_without;
     int rc = SH_OK;
     for (uint64_t i = points->n; i-- > 0 && left > 0 && rc == SH_OK;) {
         const uint64_t at = points->from + i * points->len;
         rc = repair_read(r, at, record, points->len, err);
-        if (rc != SH_OK || !refers(p, record, &end) || end <= p->len) continue;
+        if (rc != SH_OK || !refers(p, record, &packet) || is_there(p, &packet)) continue;
         rc = repair_write(r, at + p->wave_at, none, sizeof none, err);
         left--;
     }
