@@ -94,10 +94,19 @@ static uint32_t find_kind(const struct las_waves *w, const struct las_kind *want
     return best;
 }
 
+/* Returns the bits of a sample in the file. A frame of another sender may have samples beyond the bits that it names. */
+static uint32_t bits_of(const struct scanhead_wave *wave)
+{
+    uint8_t high = 0;
+    for (size_t i = 0; i < wave->n; i++)
+        high |= wave->sample[2 * i + 1];
+    return wave->bits <= 8 && high == 0 ? 8 : 16;
+}
+
 /* Returns the kind of a window's packet, from 0 on; LAS_KINDS: there is no room for another one. */
 static uint32_t choose_kind(struct las_waves *w, const struct scanhead_wave *wave)
 {
-    struct las_kind want = {.bits = wave->bits <= 8 ? 8 : 16,
+    struct las_kind want = {.bits = bits_of(wave),
                             .n = wave->n,
                             .sample_ps = wave->sample_ps,
                             .gain = wave->count_signal,
