@@ -119,14 +119,18 @@ static void report_waves(struct las *las)
     const struct recorder *r = &las->base;
     const struct las_waves *w = &las->waves;
     char what[160];
-    recorder_report(r, las->n_waves_left_out, "points whose waveforms are left out; LAS 1.2 has no place for them");
+    recorder_report(
+        r, las->n_waves_left_out,
+        las->facts.minor == 2
+            ? "points whose waveforms are left out; LAS 1.2 has no place for them"
+            : "points whose waveforms are left out: the file began without waveforms, as the head sent none");
     if (las->facts.has_waves) {
         snprintf(what, sizeof what,
                  "waveforms filled up with %llu samples without light: LAS allows 255 lengths of waveforms",
                  (unsigned long long)w->n_fill);
         recorder_report(r, w->n_filled, what);
         recorder_report(r, w->n_kindless, "waveforms left out: LAS allows 255 lengths of waveforms, of all digitisers");
-    } else if (r->options.las_wdp) {
+    } else if (r->options.las_wdp && las->n_waves_left_out == 0) {
         sh_warn(r->options.report, "%s: no .wdp is written: the head sends no waveforms (waveform.send)", r->file.path);
     }
 }

@@ -12,7 +12,8 @@ struct las {
     struct las_facts facts;
     int begun, time_came_late;
     uint64_t n_no_angle;
-    uint64_t n_beyond_returns, n_returns_cut, n_waves_left_out; /* LAS 1.2 */
+    uint64_t n_beyond_returns, n_returns_cut; /* LAS 1.2 */
+    uint64_t n_waves_left_out;                /* LAS 1.2, or the head sent none as the file began */
     struct las_waves waves;
     struct las_columns columns;   /* of the batch */
     double place[3][TRACK_BATCH]; /* the batch's coordinates, from which counts or angles are made */

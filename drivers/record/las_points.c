@@ -161,7 +161,7 @@ static int put_packets(struct las *las, int n, struct sh_err *err)
     int rc = 0, is_new, any_new = 0;
     for (int i = 0; rc == 0 && i < n; i++) {
         las->columns.packet[i] = (struct las_packet){0};
-        if (t->wave[i] == NULL) continue;
+        if (!t->has_waves || t->wave[i] == NULL) continue;
         rc = las_waves_put(&las->waves, t->n_scans, t->wave[i], &las->columns.packet[i], &is_new, err);
         any_new |= is_new;
     }

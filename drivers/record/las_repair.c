@@ -9,27 +9,19 @@
 #include "drivers/record/repair.h"
 #include "drivers/record/scan_count.h"
 
+enum { RETURN_AT = 14 }; /* in a record of any format */
+
 struct records {
-    struct las_facts facts; /* counts of all records but those of zeros at the end */
+    struct las_facts facts; /* counts of all records that are kept */
     size_t len;
-    uint64_t n_zero; /* records at the end that hold zeros alone */
     struct point_scans scans;
     int has_waves;
     struct las_packets packets; /* with waveforms */
 };
 
-/* A power cut leaves zeros; no record of ours has return 0. */
 static void take_record(void *ctx, const uint8_t *record)
 {
     struct records *r = ctx;
-    if (repair_is_zero(record, r->len)) {
-        r->n_zero++;
-        return;
-    }
-    for (; r->n_zero > 0; r->n_zero--) {
-        static const uint8_t zero[LAS_POINT_LEN_MAX];
-        las_count_record(&r->facts, zero);
-    }
     las_count_record(&r->facts, record);
     if (r->has_waves) las_packets_take(&r->packets, record);
     const uint8_t *time = record + las_time_at(&r->facts); /* after the station */
@@ -93,8 +85,9 @@ static int las_repair_all(struct repair *repair, uint8_t header[LAS_HEADER_LEN],
     if (rc == SH_OK && r->has_waves) rc = las_packets_find(&r->packets, repair, header, err);
     if (rc == SH_OK) {
         const uint64_t end = r->has_waves ? las_packets_limit(&r->packets, repair, header) : repair->len;
-        const struct repair_rows rows = {front_len, (end - front_len) / r->len, r->len};
-        rc = repair_rows(repair, &rows, take_record, r, err);
+        struct repair_rows rows = {front_len, (end - front_len) / r->len, r->len};
+        rc = repair_leave_zeros(repair, &rows, end, RETURN_AT + 1, err); /* no record of ours has return 0 */
+        if (rc == SH_OK) rc = repair_rows(repair, &rows, take_record, r, err);
     }
     if (rc == SH_OK) rc = make_whole(repair, header, r, front_len, err);
     return rc == SH_OK && r->has_waves ? las_packets_settle(&r->packets, err) : rc;

@@ -28,12 +28,18 @@ int las_waves_check(const char *path, struct sh_err *err)
     return rc;
 }
 
-static int put_head(struct las_waves *w, struct sh_err *err)
+void las_waves_head(uint8_t head[LAS_WAVES_HEAD_LEN])
 {
-    uint8_t head[LAS_WAVES_HEAD_LEN] = {0};
+    memset(head, 0, LAS_WAVES_HEAD_LEN);
     memcpy(head + 2, "LASF_Spec", 9);
     le_put16(head + 18, LAS_WAVES_RECORD);
     memcpy(head + 28, "waveform data packets", 21);
+}
+
+static int put_head(struct las_waves *w, struct sh_err *err)
+{
+    uint8_t head[LAS_WAVES_HEAD_LEN];
+    las_waves_head(head);
     return outfile_write(&w->file, head, sizeof head, err);
 }
 
@@ -88,10 +94,19 @@ static uint32_t find_kind(const struct las_waves *w, const struct las_kind *want
     return best;
 }
 
+/* Returns the bits of a sample in the file. A frame of another sender may have samples beyond the bits that it names. */
+static uint32_t bits_of(const struct scanhead_wave *wave)
+{
+    uint8_t high = 0;
+    for (size_t i = 0; i < wave->n; i++)
+        high |= wave->sample[2 * i + 1];
+    return wave->bits <= 8 && high == 0 ? 8 : 16;
+}
+
 /* Returns the kind of a window's packet, from 0 on; LAS_KINDS: there is no room for another one. */
 static uint32_t choose_kind(struct las_waves *w, const struct scanhead_wave *wave)
 {
-    struct las_kind want = {.bits = wave->bits <= 8 ? 8 : 16,
+    struct las_kind want = {.bits = bits_of(wave),
                             .n = wave->n,
                             .sample_ps = wave->sample_ps,
                             .gain = wave->count_signal,

@@ -68,6 +68,8 @@ int las_waves_keep(struct las_waves *waves, struct sh_err *err);
 /* Removes the file, unless it was kept, or X.las.part exists: then it stays as X.wdp.part, for a repair. */
 void las_waves_close(struct las_waves *waves);
 
+/* Writes the head of a record of packets, with the length 0. */
+void las_waves_head(uint8_t head[LAS_WAVES_HEAD_LEN]);
 /* Returns the name X.wdp for X.las, which the caller frees. NULL: no memory. */
 char *las_waves_path(const char *path);
 

@@ -26,14 +26,42 @@ static int packets_open(struct las_packets *p, int is_part, struct sh_err *err)
     return rc;
 }
 
-/* A completed record says its length. A record that is being written says 0. */
-static int read_len(struct las_packets *p, struct sh_err *err)
+static int fail_head(const struct las_packets *p, const struct repair *r, struct sh_err *err)
 {
-    uint8_t at[8];
-    if (p->len < LAS_WAVES_HEAD_LEN) return SH_OK;
-    const int rc = repair_read(&p->file, p->begin + LAS_WAVES_LEN_AT, at, sizeof at, err);
-    if (rc == SH_OK && le_get64(at) <= p->len - LAS_WAVES_HEAD_LEN) p->end = LAS_WAVES_HEAD_LEN + le_get64(at);
+    if (is_inside(p)) return repair_fail_damaged(r, p->begin, err);
+    return sh_fail(err, SH_EFORMAT, "%s: holds no waveforms of scanhead; put that of %s there; both are unchanged",
+                   p->path, r->path);
+}
+
+/* A power cut may leave zeros at the end of a file that was not completed. Where they reach into the head, that head
+ * counts as cut. */
+static int find_zeros(struct las_packets *p, const struct repair *r, struct sh_err *err)
+{
+    static const uint64_t HEAD_TEXT_END = 49; /* zeros follow in each head */
+    const uint64_t end = p->begin + p->len;
+    int rc = SH_OK;
+    p->zeros_at = end;
+    if (repair_is_part(r)) rc = repair_find_zeros(&p->file, p->begin, end, &p->zeros_at, err);
+    p->zeros_at -= p->begin;
+    if (p->zeros_at < HEAD_TEXT_END) p->len = p->zeros_at;
     return rc;
+}
+
+/* Checks the head of the record, as far as it is there: any file may have the name X.wdp. A completed record says its
+ * length. A record that is being written says 0. */
+static int read_head(struct las_packets *p, const struct repair *r, struct sh_err *err)
+{
+    uint8_t is[LAS_WAVES_HEAD_LEN], head[LAS_WAVES_HEAD_LEN];
+    int rc = find_zeros(p, r, err);
+    const size_t n = p->len < sizeof is ? (size_t)p->len : sizeof is;
+    if (rc == SH_OK) rc = repair_read(&p->file, p->begin, is, n, err);
+    if (rc != SH_OK) return rc;
+    las_waves_head(head);
+    if (n > LAS_WAVES_LEN_AT) memcpy(head + LAS_WAVES_LEN_AT, is + LAS_WAVES_LEN_AT, n < 28 ? n - LAS_WAVES_LEN_AT : 8);
+    if (memcmp(is, head, n) != 0) return fail_head(p, r, err);
+    const uint64_t len = le_get64(head + LAS_WAVES_LEN_AT);
+    if (n == sizeof is && len <= p->len - n && p->zeros_at == p->len) p->end = n + len;
+    return SH_OK;
 }
 
 /* Cuts .part from the .las's name. Returns 1 where the name that is left is free: the file will get it. */
@@ -44,7 +72,31 @@ static int will_be_renamed(const struct repair *r, char *las)
     return !repair_exists(las);
 }
 
-static int find_outside(struct las_packets *p, const struct repair *r, struct sh_err *err)
+/* Returns 1 where a .part's packets may have the name X.wdp already: the header is that of a completed file, or a repair
+ * was interrupted, which counts the points and renames X.wdp.part only where X.las is free. Else X.wdp is that of an
+ * older recording. */
+static int may_be_final(const uint8_t *header, int is_renamed)
+{
+    const int is_complete = strcmp((const char *)header + LAS_SOFTWARE_AT, LAS_SOFTWARE) == 0;
+    return is_complete || (is_renamed && le_get64(header + LAS_POINTS_AT) != 0);
+}
+
+/* *is_part: which of both names the packets have. */
+static int choose_name(const struct repair *r, const uint8_t *header, int is_renamed, const char *wdp, const char *part,
+                       int *is_part, struct sh_err *err)
+{
+    *is_part = repair_is_part(r) && repair_exists(part);
+    if (*is_part && is_renamed && repair_exists(wdp))
+        return sh_fail(err, SH_ESTATE, "%s: %s exists, and is not replaced; move it away, and repeat the command", part,
+                       wdp);
+    if (*is_part || (repair_exists(wdp) && (!repair_is_part(r) || may_be_final(header, is_renamed)))) return SH_OK;
+    return sh_fail(err, SH_EINPUT,
+                   "%s: its waveforms are not there: put %s beside it; or an empty file of that name, to keep the "
+                   "points alone",
+                   r->path, repair_is_part(r) ? part : wdp);
+}
+
+static int find_outside(struct las_packets *p, const struct repair *r, const uint8_t *header, struct sh_err *err)
 {
     char *las = strdup(r->path), *part = NULL;
     const int is_renamed = las != NULL && will_be_renamed(r, las);
@@ -54,15 +106,7 @@ static int find_outside(struct las_packets *p, const struct repair *r, struct sh
         part = NULL;
         rc = sh_fail(err, SH_ENOMEM, "%s: no memory to repair it", r->path);
     } else {
-        is_part = repair_is_part(r) && repair_exists(part);
-        if (is_part && is_renamed && repair_exists(wdp))
-            rc = sh_fail(err, SH_ESTATE, "%s: %s exists, and is not replaced; move it away, and repeat the command",
-                         part, wdp);
-        else if (!is_part && !repair_exists(wdp))
-            rc = sh_fail(err, SH_EINPUT,
-                         "%s: its waveforms are not there: put %s beside it; or an empty file of that name, to keep "
-                         "the points alone",
-                         r->path, repair_is_part(r) ? part : wdp);
+        rc = choose_name(r, header, is_renamed, wdp, part, &is_part, err);
     }
     p->path = is_part ? part : wdp;
     p->target = is_part && is_renamed ? wdp : NULL;
@@ -71,7 +115,7 @@ static int find_outside(struct las_packets *p, const struct repair *r, struct sh
     free(las);
     p->file.path = p->path;
     if (rc == SH_OK) rc = packets_open(p, is_part, err);
-    return rc == SH_OK ? read_len(p, err) : rc;
+    return rc == SH_OK ? read_head(p, r, err) : rc;
 }
 
 /* Checks where the header says that the packets are. Inside the file, their record begins where a point ends. The
@@ -93,11 +137,11 @@ int las_packets_find(struct las_packets *p, const struct repair *r, const uint8_
     p->begin = le_get64(header + LAS_WAVES_AT);
     const int rc = check_place(r, header, err);
     if (rc != SH_OK) return rc;
-    if ((header[LAS_ENCODING_AT] & LAS_WAVES_OUTSIDE) != 0) return find_outside(p, r, err);
+    if ((header[LAS_ENCODING_AT] & LAS_WAVES_OUTSIDE) != 0) return find_outside(p, r, header, err);
     if (p->begin == 0) return SH_OK;
     p->file = *r;
     p->len = r->len > p->begin ? r->len - p->begin : 0;
-    return read_len(p, err);
+    return read_head(p, r, err);
 }
 
 uint64_t las_packets_limit(const struct las_packets *p, const struct repair *r, const uint8_t *header)
@@ -108,23 +152,34 @@ uint64_t las_packets_limit(const struct las_packets *p, const struct repair *r, 
     return n != 0 && n < (r->len - front) / len ? front + n * len : r->len;
 }
 
-/* Returns 1 if the point's record refers to a packet; *end is that packet's end. */
-static int refers(const struct las_packets *p, const uint8_t *record, uint64_t *end)
+struct reference {
+    uint64_t at, end;
+};
+
+/* Returns 1 if the point's record refers to a packet. */
+static int refers(const struct las_packets *p, const uint8_t *record, struct reference *packet)
 {
     const uint8_t *wave = record + p->wave_at;
     const uint64_t at = le_get64(wave + 1);
-    *end = at <= UINT64_MAX - UINT32_MAX ? at + le_get32(wave + 9) : UINT64_MAX;
+    *packet = (struct reference){at, at <= UINT64_MAX - UINT32_MAX ? at + le_get32(wave + 9) : UINT64_MAX};
     return wave[0] != 0;
+}
+
+/* Where zeros begin within a packet and go on after it, the rest of its samples is lost. */
+static int is_there(const struct las_packets *p, const struct reference *packet)
+{
+    if (packet->end == p->len) return packet->at < p->zeros_at;
+    return packet->end <= p->zeros_at;
 }
 
 void las_packets_take(struct las_packets *p, const uint8_t *record)
 {
-    uint64_t end;
-    if (!refers(p, record, &end)) return;
-    if (end > p->len)
+    struct reference packet;
+    if (!refers(p, record, &packet)) return;
+    if (!is_there(p, &packet))
         p->n_without++;
-    else if (end > p->end)
-        p->end = end;
+    else if (packet.end > p->end)
+        p->end = packet.end;
 }
 
 /* Packets are written in the order of points, and before them. So only the last points may lack theirs. */
@@ -132,12 +187,13 @@ static int clear_points(struct las_packets *p, struct repair *r, const struct re
 {
     static const uint8_t none[LAS_WAVE_LEN];
     uint8_t record[LAS_POINT_LEN_MAX];
-    uint64_t left = p->n_without, end;
+    struct reference packet;
+    uint64_t left = p->n_without;
     int rc = SH_OK;
     for (uint64_t i = points->n; i-- > 0 && left > 0 && rc == SH_OK;) {
         const uint64_t at = points->from + i * points->len;
         rc = repair_read(r, at, record, points->len, err);
-        if (rc != SH_OK || !refers(p, record, &end) || end <= p->len) continue;
+        if (rc != SH_OK || !refers(p, record, &packet) || is_there(p, &packet)) continue;
         rc = repair_write(r, at + p->wave_at, none, sizeof none, err);
         left--;
     }
@@ -155,6 +211,18 @@ static int set_len(struct las_packets *p, struct sh_err *err)
     return rc == SH_OK ? 1 : rc;
 }
 
+/* A .las with its final name was whole beside its .wdp. So a .wdp that is too short for it is a piece, or that of
+ * another recording: the points keep their references, which they need for the right one. */
+static int check_whole(const struct las_packets *p, const struct repair *r, struct sh_err *err)
+{
+    const int is_short = p->n_without > 0 || p->len < LAS_WAVES_HEAD_LEN;
+    if (is_inside(p) || repair_is_part(r) || p->len == 0 || !is_short) return SH_OK;
+    return sh_fail(err, SH_EFORMAT,
+                   "%s: is shorter than the points of %s need: put the right one there; or an empty file of that name, "
+                   "to keep the points alone; both are unchanged",
+                   p->path, r->path);
+}
+
 /* Not even the head of the record is there, so no point has a packet. */
 static void leave_out_record(uint8_t *header)
 {
@@ -165,8 +233,9 @@ static void leave_out_record(uint8_t *header)
 int las_packets_repair(struct las_packets *p, struct repair *r, const struct repair_rows *points, uint8_t *header,
                        struct sh_err *err)
 {
-    int rc = clear_points(p, r, points, err), changed = p->n_without > 0 || p->len > p->end;
-    if (p->n_without > 0)
+    int rc = check_whole(p, r, err), changed = p->n_without > 0 || p->len > p->end;
+    if (rc == SH_OK) rc = clear_points(p, r, points, err);
+    if (rc == SH_OK && p->n_without > 0)
         sh_warn(r->report, "%s: %llu points have no waveform: it did not reach the disk", r->path,
                 (unsigned long long)p->n_without);
     if (rc == SH_OK && p->len < LAS_WAVES_HEAD_LEN) {

@@ -13,6 +13,7 @@ struct las_packets {
     char *path, *target; /* of a .wdp, and the name that it gets; NULL: it keeps its name */
     uint64_t begin;      /* of the record of packets in its file */
     uint64_t len;        /* bytes of it that are there */
+    uint64_t zeros_at;   /* where the zeros of a power cut begin in it; len: there are none */
     uint64_t end;        /* where its packets end: after the last one that its length covers or a point refers to */
     size_t wave_at;      /* in a point's record */
     uint64_t n_without;  /* points whose packets are not there */

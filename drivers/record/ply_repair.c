@@ -193,7 +193,7 @@ static char *renew(const struct ply_header *h, uint64_t n_vertices, int incomple
 
 struct points {
     const struct ply_header *h;
-    uint64_t n, n_zero; /* rows; those at the end that hold zeros alone */
+    uint64_t n; /* rows */
     struct point_scans scans;
 };
 
@@ -202,8 +202,7 @@ static void take_binary(void *ctx, const uint8_t *row)
     struct points *p = ctx;
     const struct ply_header *h = p->h;
     p->n++;
-    p->n_zero = repair_is_zero(row, h->row_len) ? p->n_zero + 1 : 0;
-    if (p->n_zero != 0 || (h->station_at < 0 && h->time_at < 0)) return;
+    if (repair_is_zero(row, h->row_len) || (h->station_at < 0 && h->time_at < 0)) return;
     point_scans_take(&p->scans, h->station_at >= 0 ? le_get16(row + h->station_at) : 0,
                      h->time_at >= 0 ? le_get_double(row + h->time_at) : 0);
 }
@@ -238,9 +237,9 @@ static int read_points(const struct repair *r, const struct ply_header *h, struc
         const int rc = repair_lines(r, h->len, take_text, p, end, err);
         return rc == SH_OK ? repair_check_rest(r, *end, HEADER_BEGIN, err) : rc;
     }
-    const uint64_t n = (r->len - h->len) / h->row_len;
-    const int rc = repair_rows(r, &(struct repair_rows){h->len, n, h->row_len}, take_binary, p, err);
-    if (n != h->n_vertices) p->n -= p->n_zero; /* a power cut leaves zeros, a head measures none */
+    struct repair_rows rows = {h->len, (r->len - h->len) / h->row_len, h->row_len};
+    int rc = rows.n != h->n_vertices ? repair_leave_zeros(r, &rows, r->len, 1, err) : SH_OK; /* else all may be whole */
+    if (rc == SH_OK) rc = repair_rows(r, &rows, take_binary, p, err);
     *end = h->len + p->n * h->row_len;
     return rc;
 }

@@ -103,6 +103,34 @@ int repair_is_zero(const uint8_t *row, size_t len)
     return row[0] == 0 && memcmp(row, row + 1, len - 1) == 0;
 }
 
+int repair_find_zeros(const struct repair *r, uint64_t from, uint64_t end, uint64_t *zeros_at, struct sh_err *err)
+{
+    uint8_t *block = malloc(BLOCK);
+    int rc = block != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "%s: no memory to read it", r->path);
+    size_t n = 0; /* bytes of the block, up to its last one that is not zero */
+    while (rc == SH_OK && n == 0 && end > from) {
+        n = end - from < BLOCK ? (size_t)(end - from) : BLOCK;
+        end -= n;
+        rc = repair_read(r, end, block, n, err);
+        while (rc == SH_OK && n > 0 && block[n - 1] == 0)
+            n--;
+    }
+    free(block);
+    *zeros_at = end + n;
+    return rc;
+}
+
+int repair_leave_zeros(const struct repair *r, struct repair_rows *rows, uint64_t end, size_t least, struct sh_err *err)
+{
+    uint64_t zeros_at;
+    const int rc = repair_find_zeros(r, rows->from, end, &zeros_at, err);
+    if (rc != SH_OK) return rc;
+    const uint64_t n = (zeros_at - rows->from) / rows->len, row_at = rows->from + n * rows->len;
+    const int may_be_whole = zeros_at - row_at >= least && zeros_at > row_at && row_at + rows->len == end;
+    rows->n = n + (uint64_t)may_be_whole;
+    return SH_OK;
+}
+
 struct lines {
     int (*fn)(void *ctx, const char *line, size_t len);
     void *ctx;

@@ -29,22 +29,22 @@ static int check_sent(const struct track *t, int did, int does, const char *what
                    did ? "without" : "with", what);
 }
 
-/* Notes which frames beside those of points are wanted and sent. Fails if that has changed since the first points. */
+/* Notes which frames beside those of points are wanted and sent. Fails if that has changed since the first points.
+ * Waveforms may come and go: any client can switch them, also within a scan. */
 static int take_sent(struct track *t, struct sh_err *err)
 {
     const struct scanhead *sh = t->sh;
     const int attributes = t->ops->wants_attributes && scanhead_has_attributes(sh) == 1;
     const int deviations = attributes && scanhead_has_deviations(sh) == 1;
-    const int colours = will_have_colours(t), waves = t->ops->wants_waves && scanhead_has_waves(sh) == 1;
+    const int colours = will_have_colours(t);
     int rc = check_sent(t, t->has_attributes, attributes, "attributes", err);
     if (rc == SH_OK) rc = check_sent(t, t->has_deviations, deviations, "deviations", err);
     if (rc == SH_OK) rc = check_sent(t, t->has_colours, colours, "colours", err);
-    if (rc == SH_OK) rc = check_sent(t, t->has_waves, waves, "waveforms", err);
     if (rc != SH_OK) return rc;
     t->has_attributes = attributes;
     t->has_deviations = deviations;
     t->has_colours = colours;
-    t->has_waves = waves;
+    t->has_waves = t->ops->wants_waves && scanhead_has_waves(sh) == 1;
     return SH_OK;
 }
 

@@ -121,7 +121,7 @@ struct track {
     double deviation[TRACK_BATCH]; /* scanhead_deviations; NaN: lost */
     int has_colours;               /* wanted, and sent or computed here: */
     uint8_t rgb[TRACK_BATCH][3];
-    int has_waves;                                 /* wanted, and sent: */
+    int has_waves;                                 /* wanted, and sent at present: */
     const struct scanhead_wave *wave[TRACK_BATCH]; /* the window that each point lies in; NULL: none. Windows are valid
                                                     * until the next batch */
     double wave_at[TRACK_BATCH];                   /* the point's place in it, in samples from its first one */
@@ -139,7 +139,7 @@ struct track {
 int track_is_late_start(const struct track *track, const struct scanhead_frame *start);
 /* Takes a new frame of the stream. SH_EFORMAT if one file can't hold what the stream goes on with: another CRS or
  * kind of heights; a head that begins or ceases to move, to stop on a trajectory, or to send (wanted) attributes,
- * deviations, colours or waveforms; a station number above 65535; a line of more than 2^32 pulses. SH_EFORMAT also if
+ * deviations or colours; a station number above 65535; a line of more than 2^32 pulses. SH_EFORMAT also if
  * the points lack the figure that the colours show, or if ops.metres does not allow their CRS. Errors of ops are passed
  * on. SH_ENOMEM. */
 int track_frame(struct track *track, struct scanhead *sh, const struct scanhead_frame *frame, struct sh_err *err);

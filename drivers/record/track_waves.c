@@ -44,8 +44,8 @@ int track_waves(struct track *t, const struct scanhead_frame *frame, struct sh_e
 {
     struct scanhead_wave wave[WAVES_AT_ONCE];
     if (t->ops->points == NULL) return 0;
-    /* has_waves is set as a scan begins, for recorders that want waveforms. Where has_waves of such a recorder is 0,
-     * the beginning of the scan did not come, and the scan's windows can't be placed. */
+    /* has_waves is set with each frame of points, for recorders that want waveforms. Where has_waves of such a recorder
+     * is 0, no points came since the head began to send windows, so these can't be placed. */
     if (!t->has_waves) {
         *(t->ops->wants_waves ? &t->missing.n_waves_unplaced : &t->missing.n_waves_unheld) += frame->n_points;
         return 0;

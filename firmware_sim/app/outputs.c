@@ -25,7 +25,7 @@ struct named {
     int needs_place; /* its folder must be there already */
     int is_given;    /* by an option that writes it */
     int is_filled;   /* likewise, and in place */
-    int is_sidecar;  /* it is written beside another file: meshes of one scan share their image */
+    int is_image;    /* of a mesh, beside it: meshes of one scan share their image */
     size_t n_ending; /* where each scan gets a file of its own: bytes of the path's ending; 0: it is one file */
 };
 
@@ -114,7 +114,7 @@ static int add_option(struct files *f, const struct app_file *file)
     const int is_written = file->use == APP_WRITES || file->use == APP_FILLS;
     const int rc = outputs_add(f, who, path, is_written, file->each ? n_ending : 0);
     if (rc != SH_OK) return rc;
-    f->file[f->n - 1].is_sidecar = file->ending != NULL || file->added != NULL;
+    f->file[f->n - 1].is_image = file->ending != NULL && strcmp(file->ending, ".png") == 0;
     f->file[f->n - 1].needs_place = f->file[f->n - 1].is_given = file->is_given && is_written;
     f->file[f->n - 1].is_filled = file->is_given && file->use == APP_FILLS;
     return SH_OK;
@@ -275,7 +275,7 @@ static int check(const struct files *f, struct sh_err *err)
             if (!other->is_written && other->is_there && outputs_is_same(out, other))
                 return sh_fail(err, SH_EINPUT, "%s %s: is also read as %s, and would be overwritten; name another file",
                                out->who, out->path, other->who);
-            if (other->is_written && k < i && !(out->is_sidecar && other->is_sidecar) && outputs_is_same(out, other))
+            if (other->is_written && k < i && !(out->is_image && other->is_image) && outputs_is_same(out, other))
                 return sh_fail(err, SH_EINPUT, "%s %s: %s writes the same file; name another one", out->who, out->path,
                                other->who);
         }

@@ -144,6 +144,59 @@ static void warn_noise(const struct config *cfg, const struct waveform *waveform
             cfg->file, peak / spec->noise, 1.0 / spec->noise, peak, LEAST_SNR, advice);
 }
 
+/* Echoes are found in windows of samples only, and these lie where the signal reaches keep_db. */
+static void warn_windows(const struct config *cfg, const struct waveform *waveform, const struct sh_report *report)
+{
+    const struct waveform_spec *spec = waveform_spec_of(waveform);
+    const double peak = 1.001 * waveform_pulse_peak(waveform); /* the digits of a level in dB */
+    if (spec->near_m < spec->far_m || spec->keep <= peak) return;
+    sh_warn(report,
+            "%s: waveform.keep_db: samples are kept from %.3g dB above the level of an echo on, so weaker echoes are "
+            "not found; at %.3g dB or less, all are",
+            cfg->file, 10.0 * log10(spec->keep / peak), 0.1 * floor(100.0 * log10(peak)));
+}
+
+/* No light from beyond the profile's ranges is in the samples. */
+static void warn_gate(const struct config *cfg, const struct sh_report *report)
+{
+    const struct config_waveform *w = &cfg->waveform;
+    const struct config_profile *p = &cfg->profile;
+    if (!(w->near_m < w->far_m) || (w->near_m < p->range_max_m && w->far_m > p->range_min_m)) return;
+    sh_warn(report,
+            "%s: waveform.near_m: the window from %.10g to %.10g m has no light; the ranges of head profile %s are "
+            "%.10g to %.10g m",
+            cfg->file, w->near_m, w->far_m, p->name, p->range_min_m, p->range_max_m);
+}
+
+/* Returns the full width at half maximum of the table, ns. */
+static double width_of(const struct pulse_table *table)
+{
+    uint32_t top = 0;
+    for (uint32_t i = 1; i < table->n; i++)
+        if (table->power[i] > table->power[top]) top = i;
+    const double half = 0.5 * table->power[top];
+    uint32_t a = top, b = top;
+    while (a > 0 && table->power[a] > half)
+        a--;
+    while (b + 1 < table->n && table->power[b] > half)
+        b++;
+    const double before = a < top ? (half - table->power[a]) / (table->power[a + 1] - table->power[a]) : 0.0;
+    const double after = b > top ? (half - table->power[b]) / (table->power[b - 1] - table->power[b]) : 0.0;
+    return (b - a - fmax(before, 0.0) - fmax(after, 0.0)) * table->step_ns;
+}
+
+/* Points that are not found in the samples are those of a pulse as wide as the profile's. */
+static void warn_width(const struct config *cfg, const struct pulse_table *table, const struct sh_report *report)
+{
+    const double width_ns = width_of(table), want_ns = cfg->profile.pulse_width_ns;
+    if (cfg->waveform.echoes != WAVE_ECHOES_MODEL || fabs(width_ns - want_ns) <= 0.1 * want_ns) return;
+    sh_warn(report,
+            "%s: waveform.pulse_file: the pulse is %.3g ns wide, but points are those of a pulse of %.3g ns "
+            "(pulse_width_ns of head profile %s): they differ from the samples; with waveform.echoes they are found in "
+            "them",
+            cfg->file, width_ns, want_ns, cfg->profile.name);
+}
+
 static int make_waveform(const struct site *site, const struct sh_report *report, struct waveform **out,
                          struct sh_err *err)
 {
@@ -161,7 +214,11 @@ static int make_waveform(const struct site *site, const struct sh_report *report
     if (cfg->waveform.echoes != WAVE_ECHOES_MODEL) rc = waveform_check_detection(*out, &why);
     if (rc != SH_OK) return sh_fail(err, rc, "%s: waveform.echoes: %.300s", cfg->file, why.text);
     warn_digits(cfg, &spec, report);
-    if (cfg->waveform.echoes != WAVE_ECHOES_MODEL) warn_noise(cfg, *out, report);
+    warn_gate(cfg, report);
+    if (cfg->waveform.pulse == WAVEFORM_TABLE) warn_width(cfg, &table, report);
+    if (cfg->waveform.echoes == WAVE_ECHOES_MODEL) return SH_OK;
+    warn_noise(cfg, *out, report);
+    warn_windows(cfg, *out, report);
     return SH_OK;
 }
 

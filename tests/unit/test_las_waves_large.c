@@ -189,7 +189,8 @@ static void test_fill(void **state)
     } rows[] = {{12, 205.4, 205},   {12, 205.6, 206}, {12, -1, 0},   {12, 4095, 4095}, {12, 4096, 4095},
                 {14, 20000, 16383}, {8, 255, 255},    {8, 256, 255}, {8, 200, 200}};
     static uint8_t sample[2 * N], bytes[2 * KIND];
-    memset(sample, 1, sizeof sample);
+    for (size_t i = 0; i < N; i++)
+        sample[2 * i] = 1;
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
         struct scanhead_wave wave = {.sample = sample, .sample_ps = 1000, .count_signal = 1};
         struct las_waves waves = {.n_kinds = 0};
@@ -209,15 +210,42 @@ static void test_fill(void **state)
         if (las_waves_end(&waves, &err) != 0) fail_msg("%s", err.text);
         assert_int_equal(pread(waves.file.fd, bytes, packet.len, (off_t)packet.at), packet.len);
         for (size_t k = 0; k < KIND; k++)
-            assert_int_equal(rig_uint(bytes + width * k, (int)width), k >= N ? rows[i].dark : width == 1 ? 1 : 0x101);
+            assert_int_equal(rig_uint(bytes + width * k, (int)width), k >= N ? rows[i].dark : 1);
         las_waves_close(&waves);
     }
 }
 
+/* A frame names 8 bits, and has a sample of 300: the packet has 16 bits, and the sample. */
+static void test_more_bits(void **state)
+{
+    (void)state;
+    static const uint8_t sample[] = {1, 0, 300 & 255, 300 >> 8, 3, 0}, plain[] = {1, 0, 255, 0, 3, 0};
+    struct scanhead_wave wave = {.n = 3, .sample = sample, .sample_ps = 1000, .bits = 8, .count_signal = 1};
+    struct las_waves waves = {.n_kinds = 0};
+    struct las_packet packet;
+    struct sh_err err = {0};
+    uint8_t got[6];
+    int is_new;
+    assert_int_equal(las_waves_open(&waves, rig_path("a.las"), &err), 0);
+    assert_int_equal(las_waves_put(&waves, 1, &wave, &packet, &is_new, &err), 0);
+    assert_int_equal(waves.kind[packet.kind - 1].bits, 16);
+    assert_int_equal(packet.len, sizeof sample);
+    assert_int_equal(las_waves_flush(&waves, &err), 0);
+    assert_int_equal(pread(waves.file.fd, got, sizeof got, (off_t)packet.at), sizeof got);
+    assert_memory_equal(got, sample, sizeof sample);
+    wave.sample = plain;
+    wave.pulse++;
+    assert_int_equal(las_waves_put(&waves, 1, &wave, &packet, &is_new, &err), 0);
+    assert_int_equal(waves.kind[packet.kind - 1].bits, 8);
+    assert_int_equal(packet.len, 3);
+    las_waves_close(&waves);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_large),           cmocka_unit_test(test_kinds),
-                                       cmocka_unit_test(test_short_kinds),     cmocka_unit_test(test_no_kind_left),
-                                       cmocka_unit_test(test_cut_before_copy), cmocka_unit_test(test_fill)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_more_bits),    cmocka_unit_test(test_large),
+                                       cmocka_unit_test(test_kinds),        cmocka_unit_test(test_short_kinds),
+                                       cmocka_unit_test(test_no_kind_left), cmocka_unit_test(test_cut_before_copy),
+                                       cmocka_unit_test(test_fill)};
     return cmocka_run_group_tests(tests, rig_set_up, rig_tear_down);
 }

@@ -3,101 +3,9 @@
  * Points without their packets say so. */
 #include <sys/stat.h>
 
-#include "tests/unit/repair_rig.h"
-#include "tests/unit/waves_rig.h"
+#include "tests/unit/las_packets_rig.h"
 
-enum { N = 40, LINES = 400, N_SAMPLES = 12, POINT = 61, PACKET = 2 * N_SAMPLES, EVLR = 60, WAVE_AT = 30 };
-
-static struct bytes left, left_wdp, whole; /* as a kill leaves them; completed, with its packets inside */
-static char wdp[168], wdp_part[176];
-
-/* At the end of a line its points are written. */
-static void put_line_end(uint32_t line)
-{
-    static uint8_t out[256];
-    const struct line_end end = {.line = line, .pulse0 = line * N, .n_fired = N, .n_cast = N, .n_echoes = N};
-    rig_put(out, native_encode_line_end(out, sizeof out, &end, 0));
-}
-
-static void put_stream(uint32_t lines, uint16_t n_samples)
-{
-    static struct rig_point p[N];
-    static struct rig_window w[N];
-    struct native_anchor a = rig_anchor_of(NATIVE_CRS_UTM, 32632, 1);
-    for (uint32_t i = 0; i < N; i++) {
-        p[i] = (struct rig_point){5000, 0, 0, 0, 1, 1, 1};
-        w[i] = (struct rig_window){i, 28, n_samples, {0, 0, 0}};
-    }
-    rig_begin();
-    rig_wave_descriptor(0, 1, 4);
-    rig_anchor(&a);
-    for (uint32_t line = 0; line < lines; line++) {
-        /* Another digitiser needs a new descriptor: the header is written again while points come. */
-        struct rig_digitiser d = rig_12_bits;
-        if (line > 0) d.baseline_16++;
-        rig_points(line, line * N, line * N, p, N);
-        rig_waves(line, line * N, &d, w, N);
-        put_line_end(line);
-    }
-}
-
-static size_t front_of(const struct bytes *b)
-{
-    return (size_t)rig_uint(b->data + 96, 4);
-}
-
-static size_t left_len(const char *path)
-{
-    struct stat st;
-    assert_int_equal(stat(path, &st), 0);
-    return (size_t)st.st_size;
-}
-
-/* All frames have come, and are on the disk; the end has not. */
-static void leave(void)
-{
-    struct scanhead *sh;
-    struct scanhead_frame frame;
-    struct recorder *rec;
-    const struct recorder_options options = {0};
-    fclose(rig_stream);
-    rig_stream = NULL;
-    assert_int_equal(scanhead_open(rig_shs, &sh, NULL, 0), 0);
-    assert_int_equal(recorder_open(recorder_find(repair_path, &repair_err), repair_path, &options, &rec, &repair_err),
-                     0);
-    while (scanhead_next(sh, &frame, -1) == 0)
-        if (recorder_frame(rec, sh, &frame, &repair_err) != 0) fail_msg("%s", repair_err.text);
-    for (int i = 0; i < 2; i++) /* the second call finds that nothing was written since the first */
-        assert_int_equal(recorder_save(rec, &repair_err), 0);
-    left = repair_slurp(repair_part);
-    left_wdp = repair_slurp(wdp_part);
-    assert_int_equal(recorder_close(rec, 0, &repair_err), 0);
-    scanhead_close(sh);
-    assert_int_equal(access(wdp_part, F_OK), -1);
-}
-
-static int set_up(void **state)
-{
-    if (rig_set_up(state) != 0) return -1;
-    repair_name("a.las");
-    snprintf(wdp, sizeof wdp, "%s", rig_path("a.wdp"));
-    snprintf(wdp_part, sizeof wdp_part, "%s.part", wdp);
-    put_stream(2, N_SAMPLES);
-    leave();
-    put_stream(2, N_SAMPLES);
-    assert_int_equal(rig_record(repair_path, (struct recorder_options){0}, RIG_KEEP, &repair_err), 0);
-    whole = repair_slurp(repair_path);
-    unlink(repair_path);
-    return 0;
-}
-
-static int tear_down(void **state)
-{
-    free(left.data);
-    free(left_wdp.data);
-    free(whole.data);
-    return rig_tear_down(state);
-}
+enum { LINES = 400 };
 
 static char said[400];
 
@@ -121,7 +29,7 @@ static void check(size_t n_points, size_t n_packets)
     static const uint8_t none[29];
     const int has_packets = access(wdp, F_OK) == 0;
     struct bytes got = repair_slurp(repair_path), packets = has_packets ? repair_slurp(wdp) : (struct bytes){NULL, 0};
-    const size_t front = front_of(&whole);
+    const size_t front = packets_front_of(&whole);
     const uint64_t first = rig_uint(whole.data + 227, 8);
     if (n_packets > n_points) n_packets = n_points;
     assert_int_equal(got.len, front + n_points * POINT);
@@ -160,10 +68,10 @@ static void repair_cut_to(size_t las_len, size_t wdp_len)
 static void test_cut(void **state)
 {
     (void)state;
-    const size_t front = front_of(&left), n = 2 * N;
+    const size_t front = packets_front_of(&left), n = 2 * N;
     assert_int_equal(left.len, front + n * POINT);
     assert_int_equal(left_wdp.len, EVLR + n * PACKET);
-    assert_int_equal(front_of(&whole), front); /* with the descriptors of all packets that are there */
+    assert_int_equal(packets_front_of(&whole), front); /* with the descriptors of all packets that are there */
     assert_int_equal(rig_uint(left.data + 100, 4), rig_uint(whole.data + 100, 4));
     assert_memory_equal(left.data + 375, whole.data + 375, front - 375);
     for (size_t cut = 0; cut < 40; cut++) {
@@ -185,7 +93,7 @@ static void test_cut(void **state)
 static void test_cut_copy(void **state)
 {
     (void)state;
-    const size_t front = front_of(&left), n = 2 * N, half = whole.len - 5 * PACKET - 3;
+    const size_t front = packets_front_of(&left), n = 2 * N, half = whole.len - 5 * PACKET - 3;
     struct repaired file;
     repair_write_file(repair_part, whole.data, half);
     FILE *part = fopen(repair_part, "r+b");
@@ -221,7 +129,7 @@ static void test_cut_inside(void **state)
         assert_int_equal(rig_uint(got.data + 6, 2), 1 << 4 | (n_bytes < EVLR ? 0 : 1 << 1));
         if (n_bytes >= EVLR) assert_int_equal(rig_uint(got.data + first + 20, 8), packets * PACKET);
         for (size_t i = 0; i < n; i++)
-            assert_int_equal(got.data[front_of(&got) + i * POINT + WAVE_AT] != 0, i < packets);
+            assert_int_equal(got.data[packets_front_of(&got) + i * POINT + WAVE_AT] != 0, i < packets);
         free(got.data);
         if (repair_file(repair_path, NULL, &file, &repair_err) != 0) fail_msg("%s", repair_err.text);
         assert_true(file.was_whole);
@@ -267,8 +175,8 @@ static void test_refused(void **state)
              wdp);
     assert_string_equal(repair_err.text, want);
     assert_true(fcntl(STDOUT_FILENO, F_GETFD) >= 0);
-    assert_int_equal(left_len(wdp_part), left_wdp.len);
-    assert_int_equal(left_len(repair_part), left.len);
+    assert_int_equal(packets_len_of(wdp_part), left_wdp.len);
+    assert_int_equal(packets_len_of(repair_part), left.len);
     unlink(wdp);
     /* Beside another FILE both parts keep their names. */
     repair_write_file(repair_path, "", 0);
@@ -276,7 +184,7 @@ static void test_refused(void **state)
     assert_true(file.is_part);
     repair_free(&file);
     assert_int_equal(access(wdp, F_OK), -1);
-    assert_int_equal(left_len(wdp_part), left_wdp.len);
+    assert_int_equal(packets_len_of(wdp_part), left_wdp.len);
     unlink(repair_path);
     unlink(repair_part);
     unlink(wdp_part);
@@ -288,7 +196,7 @@ static void test_refused(void **state)
         repair_write_file(repair_path, wrong.data, wrong.len);
         assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), SH_EFORMAT);
         assert_non_null(strstr(repair_err.text, "is damaged at byte 227"));
-        assert_int_equal(left_len(repair_path), wrong.len);
+        assert_int_equal(packets_len_of(repair_path), wrong.len);
         free(wrong.data);
         unlink(repair_path);
     }
@@ -302,7 +210,7 @@ static void check_full(rlim_t size, uint16_t n_samples, const char *names, size_
     struct rlimit old, small;
     struct repaired file;
     void (*was)(int) = signal(SIGXFSZ, SIG_IGN);
-    put_stream(LINES, n_samples);
+    packets_put_stream(LINES, n_samples);
     fclose(rig_stream);
     rig_stream = NULL;
     getrlimit(RLIMIT_FSIZE, &old);
@@ -320,10 +228,10 @@ static void check_full(rlim_t size, uint16_t n_samples, const char *names, size_
     repair_free(&file);
     struct bytes got = repair_slurp(repair_path);
     size_t with = 0;
-    while (with < n_points && got.data[front_of(&got) + with * POINT + WAVE_AT] != 0)
+    while (with < n_points && got.data[packets_front_of(&got) + with * POINT + WAVE_AT] != 0)
         with++;
     assert_int_equal(with, n_packets);
-    assert_int_equal(left_len(wdp), EVLR + n_packets * 2 * n_samples);
+    assert_int_equal(packets_len_of(wdp), EVLR + n_packets * 2 * n_samples);
     free(got.data);
     unlink(repair_path);
     unlink(wdp);
@@ -333,14 +241,14 @@ static void check_full(rlim_t size, uint16_t n_samples, const char *names, size_
 static void test_disk_full(void **state)
 {
     (void)state;
-    check_full(100000, 60, "a.wdp", (100000 - front_of(&left)) / POINT, (100000 - EVLR) / 120);
+    check_full(100000, 60, "a.wdp", (100000 - packets_front_of(&left)) / POINT, (100000 - EVLR) / 120);
 }
 
 /* Only the copy of the packets has no room: all is kept, in two files. */
 static void test_no_room_for_copy(void **state)
 {
     (void)state;
-    const rlim_t size = front_of(&left) + (rlim_t)LINES * N * POINT + 5000;
+    const rlim_t size = packets_front_of(&left) + (rlim_t)LINES * N * POINT + 5000;
     assert_true(EVLR + (rlim_t)LINES * N * PACKET < size);
     check_full(size, N_SAMPLES, "a.las", LINES * N, LINES * N);
 }
@@ -351,5 +259,5 @@ int main(void)
         cmocka_unit_test(test_cut),     cmocka_unit_test(test_cut_copy),  cmocka_unit_test(test_cut_inside),
         cmocka_unit_test(test_refused), cmocka_unit_test(test_disk_full), cmocka_unit_test(test_no_room_for_copy),
     };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
+    return cmocka_run_group_tests(tests, packets_set_up, packets_tear_down);
 }

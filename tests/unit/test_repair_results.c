@@ -70,9 +70,9 @@ static void a_line_for_each(void **state)
 {
     static const char *const lines[] = {
         "scanhead: a.ply: whole: 5 points, nothing to repair\n",
-        "scanhead: a.ply: kept 6 points of 1 scan; 1 byte at the end cut; the data after that are missing\n",
+        "scanhead: a.ply: kept 6 points of 1 scan; 1 byte at the end cut; data after that may be missing\n",
         "scanhead: a.ply: kept 7 packets of 2 scans; 0 bytes at the end cut; nothing else was changed\n",
-        ("scanhead: a.ply.part: kept 8 points; 2 bytes at the end cut; the data after that are missing\n"
+        ("scanhead: a.ply.part: kept 8 points; 2 bytes at the end cut; data after that may be missing\n"
          "scanhead: a.ply.part keeps its name: a.ply exists, and is not replaced\n"),
         "scanhead: f4: it is broken\n"};
     static const char *const numbers[] = {"0", "1", "2", "3", "4"};

@@ -230,6 +230,50 @@ static void a_bandwidth_that_is_advised_is_enough(void **state)
     assert_non_null(strstr(warned, "many echoes are of noise alone"));
 }
 
+/* One part of a warning is there or not. */
+static void expect_warned(const char *waveform, const char *says, int is_there)
+{
+    spec_of(waveform, "noise: {range: off}\n");
+    if ((strstr(warned, says) != NULL) != is_there) fail_msg("%s: %s", waveform, warned);
+}
+
+/* The receiver has no limit of bandwidth, so an echo at the threshold has a signal of 0 dB. */
+static void a_window_that_hides_echoes_is_told(void **state)
+{
+    (void)state;
+    expect_warned("echoes: fraction, keep_db: 20", "waveform.keep_db: samples are kept from 20 dB above", 1);
+    expect_warned("echoes: fraction, keep_db: 20", "at 0 dB or less, all are", 1);
+    expect_warned("echoes: fraction, keep_db: 0", "keep_db", 0);
+    expect_warned("send: on, keep_db: 20", "keep_db", 0); /* points come from the model */
+    expect_warned("echoes: fraction, keep_db: 20, near_m: 2, far_m: 31", "keep_db", 0);
+    /* The pulse of 4 ns becomes one of sqrt(4^2 + (0.312 / 0.05)^2) = 7.4 ns, and has 0.54 of its height: -2.7 dB. */
+    expect_warned("echoes: fraction, keep_db: 0, bandwidth_mhz: 50", "at -2.7 dB or less", 1);
+}
+
+static void a_window_without_light_is_told(void **state)
+{
+    (void)state;
+    char waveform[96];
+    spec_of("send: on", "");
+    const double most_m = cfg->profile.range_max_m;
+    for (int beyond = 0; beyond < 2; beyond++) {
+        snprintf(waveform, sizeof waveform, "send: on, near_m: %.10g, far_m: %.10g", most_m - !beyond, most_m + 10);
+        expect_warned(waveform, "has no light; the ranges of head profile", beyond);
+    }
+}
+
+/* A triangle is as wide at half of its height as half of its base. The profile's pulse has 4 ns. */
+static void a_pulse_of_another_width_is_told(void **state)
+{
+    (void)state;
+    assert_true(cfg->profile.pulse_width_ns == 4.0);
+    write_pulse("t_ns,power\n0,0\n20,3\n40,0\n");
+    expect_warned(FROM_FILE, "the pulse is 20 ns wide, but points are those of a pulse of 4 ns", 1);
+    expect_warned(FROM_FILE ", echoes: gaussians", "ns wide", 0);
+    write_pulse("t_ns,power\n0,0\n2,1\n4,2\n6,1\n8,0\n");
+    expect_warned(FROM_FILE, "ns wide", 0);
+}
+
 /* ---- blocks and the plan */
 
 static void a_block_describes_the_digitiser(void **state)
@@ -317,6 +361,9 @@ int main(void)
         cmocka_unit_test(usual_pulses),
         cmocka_unit_test(room_of_a_block),
         cmocka_unit_test(a_stream_has_400_mb_of_waveforms_a_second),
+        cmocka_unit_test(a_window_that_hides_echoes_is_told),
+        cmocka_unit_test(a_window_without_light_is_told),
+        cmocka_unit_test(a_pulse_of_another_width_is_told),
         cmocka_unit_test(a_bandwidth_that_is_advised_is_enough),
         cmocka_unit_test(a_block_describes_the_digitiser),
         cmocka_unit_test(the_plan_has_a_row),

@@ -360,6 +360,27 @@ static void a_saturated_echo_is_flagged_and_ranged(void **state)
     }
 }
 
+/* Samples are limited at the level of detection itself, so tops are not seen and their heights are fitted. No echo below
+ * the level is reported all the same. Echoes of three times the level are seen by all detectors. */
+static void a_saturated_echo_is_not_below_the_level(void **state)
+{
+    (void)state;
+    struct waveform_spec spec = wave_spec();
+    struct wave_echoes w;
+    spec.full_scale = 1.0;
+    wave_open(&w, &spec);
+    for (int d = 0; d < WAVE_DETECTORS; d++)
+        for (uint64_t p = 0; p < 400; p++) {
+            const double amplitude = p < 300 ? 0.7 + 0.002 * (double)p : 3.0;
+            const struct waveform_return r = {20.0 + 0.001 * (double)p, amplitude, 0.0, WAVEFORM_POINT};
+            const uint32_t n = wave_shoot(&w, all[d], p, &r, 1);
+            for (uint32_t i = 0; i < n; i++)
+                assert_true(w.echo[i].amplitude >= 1.0);
+            if (p >= 300) assert_true(n == 1 && w.echo[0].saturated);
+        }
+    wave_close(&w);
+}
+
 /* Only the digits are at their limit, of 100 thresholds: the receiver takes 400, so it is not blind for 40 ns after. A
  * wall 3 m behind the target stays an echo of its own. Ranges are within 4 deviations of `threshold`, the roughest:
  * 14 mm at an amplitude of 24 (core/waveform/DETECTION.md). */
@@ -402,6 +423,7 @@ int main(void)
         cmocka_unit_test(overlapping_surfaces_are_all_found),
         cmocka_unit_test(the_deviation_shows_mixed_echoes),
         cmocka_unit_test(a_saturated_echo_is_flagged_and_ranged),
+        cmocka_unit_test(a_saturated_echo_is_not_below_the_level),
         cmocka_unit_test(a_receiver_that_does_not_saturate_is_not_blind),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

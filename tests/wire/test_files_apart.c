@@ -154,6 +154,8 @@ static const struct {
     {"record @c.yaml --output=@o.PTX --stats=@o.PTX.grid", "--output", "--stats"},
     {"record @c.yaml --truth=@o-2.ptx.grid --output=@o.ptx --split", "--output", "--truth"},
     {"record @c.yaml --output=@o.las --surfaces=@o.wdp.part", "--output", "--surfaces"},
+    {"record @c.yaml --output=@o.LAS --output=@o.las", "--output", "--output"}, /* o.wdp.part */
+    {"record @c.yaml --output=@o.OBJ --output=@o.obj", "--output", "--output"}, /* o.mtl */
     {"record udp:127.0.0.1:0 --raw --output=@o.pcapng --stats=@o.pcapng", "--stats", "--output"},
     {"record udp:127.0.0.1:0 --raw --output=@o.pcapng --stats=@o.pcapng.part", "--output", "--stats"},
     {"record --repair @o.ply --stats=@o.ply", "--repair", "--stats"}, /* of o.ply.part */

@@ -30,7 +30,7 @@ static void repair_say(const struct repaired *f)
     else
         fprintf(stderr, "scanhead: %s: kept %" PRIu64 " %s%s; %" PRIu64 " byte%s at the end cut%s\n",
                 f->is_part ? f->part : f->path, f->n_kept, f->unit, scans, f->cut_bytes, f->cut_bytes == 1 ? "" : "s",
-                f->was_whole ? "; nothing else was changed" : "; the data after that are missing");
+                f->was_whole ? "; nothing else was changed" : "; data after that may be missing");
     if (f->is_part) fprintf(stderr, "scanhead: %s keeps its name: %s exists, and is not replaced\n", f->part, f->path);
 }
 
