@@ -6,6 +6,7 @@
 
 #include "firmware_sim/app/studio/coverage/next.h"
 #include "firmware_sim/app/studio/page_json.h"
+#include "firmware_sim/config/config.h"
 
 enum { LINE_LEN = 160 };
 
@@ -17,6 +18,13 @@ static const char *ready_line(const struct coverage_next_place *p, uint32_t numb
     snprintf(line, LINE_LEN, "{name: next-%u, position_m: [%.3f, %.3f, %.3f]%s}", number, p->position_m[0],
              p->position_m[1], p->position_m[2], heading);
     return line;
+}
+
+/* The sections of the station whose scanner and tripod's cone the scans have. The line of a place lacks them. */
+static const struct config_station *like_of(const struct coverage_result *result)
+{
+    const struct config *cfg = result->site->cfg;
+    return &cfg->station[result->base % cfg->n_stations]; /* stops go through all stations, round after round */
 }
 
 static double estimate_of(const struct coverage_next *next, uint32_t round, uint32_t place)
@@ -55,6 +63,12 @@ static void print_round(const struct coverage_next *next, const struct coverage_
     printf("with the first of them %.3f m2 (%.3f %%) are seen by no station:\n  - %s\n", r->none_m2,
            coverage_percent(r->none_m2, result->sums.area_m2),
            ready_line(&next->place[r->tried[0].place], number + 1, line));
+    const struct config_station *like = like_of(result);
+    if (like->tripod.given || like->has_scanner)
+        printf("    the scans have the scanner and the tripod's cone of station %s: add its %s\n", like->name,
+               !like->has_scanner    ? "tripod"
+               : !like->tripod.given ? "scanner"
+                                     : "tripod and scanner");
 }
 
 void coverage_next_print(const struct coverage_next *next, const struct coverage_result *result)
@@ -123,10 +137,16 @@ static void put_place(struct json *json, const struct coverage_next *next, uint3
 
 void coverage_next_put(struct json *json, const struct coverage_next *next, const struct coverage_result *result)
 {
+    const struct config_station *like = like_of(result);
     json_open_object(json, "next");
     json_uint(json, "directions", next->directions);
     json_double(json, "step_deg", next->whole_cells ? (double)NAN : next->step_deg);
     json_double(json, "largest_difference_m2", largest_error_m2(next));
+    json_string(json, "like", like->name);
+    json_open_array(json, "sections");
+    if (like->tripod.given) json_string(json, NULL, "tripod");
+    if (like->has_scanner) json_string(json, NULL, "scanner");
+    json_close_array(json);
     json_open_array(json, "stations");
     for (uint32_t i = 0; i < next->n_rounds; i++)
         put_round(json, next, result, i);
