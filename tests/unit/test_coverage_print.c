@@ -50,7 +50,7 @@ static struct coverage_next_place place[4] = {{{1, 2, 3}, 0, 1.5, 0.5, COVERAGE_
                                               {{1.5, 2.5, 3.5}, 10, 2, 1, COVERAGE_PLACE_OPEN}};
 /* Estimates differ from scans by 0.5, 0.25, 1.5 and 0.125. */
 static double estimate_m2[8] = {5.5, 3.75, 0, 1, 0, 0.5, 0, 0.125};
-static struct coverage_next_round rounds[2] = {{2, {{0, 6.0, 5.0}, {1, 4.5, 4.0}}, 3.0},
+static struct coverage_next_round rounds[3] = {{2, {{0, 6.0, 5.0}, {1, 4.5, 4.0}}, 3.0},
                                                {2, {{1, 3.5, 2.0}, {3, 0.75, 0.25}}, 1.0}};
 static struct coverage_next next = {.place = place,
                                     .n = 4,
@@ -280,12 +280,41 @@ static void nothing_left_to_gain(void **state)
     free(text);
     next.n_rounds = 0;
     next.whole_cells = 1;
+    rounds[0].n_tried = 0;
     text = printed(1);
     assert_string_equal(text,
                         "\nplaces     4 to stand at\n"
                         "estimates  1234 rays from each place, pulses of the head; each cell that they hit counts\n"
                         "\nno station: all that can be seen from these places is seen by a station already\n");
     free(text);
+}
+
+/* Nothing is said about what stations see where no place was compared, where no ray from one hits anything, and where
+ * only some places were scanned. */
+static void other_reasons_for_no_station(void **state)
+{
+    (void)state;
+    struct coverage_next_place none[2] = {{.front = 0.1, .state = COVERAGE_PLACE_WITHIN},
+                                          {.front = (double)NAN, .state = COVERAGE_PLACE_WITHIN}};
+    struct coverage_next_round round = {.n_tried = 0};
+    const struct coverage_next before = next;
+    static const struct {
+        uint32_t within, n_tried;
+        enum coverage_place second;
+        const char *says;
+    } rows[] = {{2, 0, COVERAGE_PLACE_WITHIN, "no place is left to compare;"},
+                {1, 0, COVERAGE_PLACE_OPEN, "no ray from these places hits a surface"},
+                {1, 1, COVERAGE_PLACE_CHOSEN, "whole scans from the best places add nothing\n"}};
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        none[1].state = rows[i].second;
+        if (rows[i].n_tried > 0) none[1].front = 1.0;
+        round.n_tried = rows[i].n_tried;
+        next = (struct coverage_next){.place = none, .n = 2, .within = rows[i].within, .round = &round, .n_asked = 1};
+        char *text = printed(1), *from = strstr(text, "\nno station: ");
+        if (from == NULL || strncmp(from + 13, rows[i].says, strlen(rows[i].says)) != 0) fail_msg("%zu: %s", i, text);
+        free(text);
+    }
+    next = before;
 }
 
 /* Labels stand by their unseen area, the largest first, and of equal ones as they are numbered. Neither the whole area
@@ -332,6 +361,7 @@ int main(void)
         cmocka_unit_test(each_line_of_next),
         cmocka_unit_test(sections_that_belong_to_a_line),
         cmocka_unit_test(nothing_left_to_gain),
+        cmocka_unit_test(other_reasons_for_no_station),
     };
     return cmocka_run_group_tests(tests, name_them, NULL);
 }

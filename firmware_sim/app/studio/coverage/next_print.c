@@ -71,6 +71,19 @@ static void print_round(const struct coverage_next *next, const struct coverage_
                                      : "tripod and scanner");
 }
 
+/* Says why a round has chosen no place. */
+static const char *why_none(const struct coverage_next *next)
+{
+    int sees = 0;
+    for (uint32_t i = 0; i < next->n; i++)
+        sees |= next->place[i].state != COVERAGE_PLACE_WITHIN && !isnan(next->place[i].front);
+    if (next->within == next->n)
+        return "no place is left to compare; try --at, --candidates, or a mesh whose faces are turned round";
+    if (!sees) return "no ray from these places hits a surface within the head's ranges; try --at or --candidates";
+    if (next->round[next->n_rounds].n_tried > 0) return "whole scans from the best places add nothing";
+    return "all that can be seen from these places is seen by a station already";
+}
+
 void coverage_next_print(const struct coverage_next *next, const struct coverage_result *result)
 {
     printf("\nplaces     %" PRIu32 " to stand at", next->n);
@@ -87,8 +100,7 @@ void coverage_next_print(const struct coverage_next *next, const struct coverage
     for (uint32_t i = 0; i < next->n_rounds; i++)
         print_round(next, result, i);
     if (next->n_rounds < next->n_asked)
-        printf("\nno %sstation: all that can be seen from these places is seen by a station already\n",
-               next->n_rounds > 0 ? "further " : "");
+        printf("\nno %sstation: %s\n", next->n_rounds > 0 ? "further " : "", why_none(next));
 }
 
 static void put_round(struct json *json, const struct coverage_next *next, const struct coverage_result *result,
