@@ -82,6 +82,8 @@ static void test_chosen_stations(void **state)
     wire_expect_usage(wire, WITH("batch", config, "-o", "x", "--format", "ply", "--list", "--stations", "2"),
                       "head.frames");
     wire_expect_usage(wire, WITH("batch", config, "-o", "x", "--format", "ply", "--list"), "head.frames");
+    wire_expect_usage(wire, WITH("batch", config, "-o", "x", "--format", "las,ply,.las", "--list"),
+                      "batch: --format las,ply,.las: the ending las is given twice; allowed once");
 }
 
 /* Jobs are counted from 1 over all shards; a job's shard is its number modulo their count (batch.h). */
