@@ -267,6 +267,18 @@ static void sections_that_belong_to_a_line(void **state)
     result.base = 0;
 }
 
+/* A place of --candidates is scanned where it is. So its line has micrometres, and the line of a grid has millimetres. */
+static void finer_places_have_more_digits(void **state)
+{
+    (void)state;
+    place[0].position_m[0] = 7.9996;
+    char *text = printed(1);
+    assert_non_null(strstr(text, "  - {name: next-1, position_m: [7.999600, 2.000000, 3.000000]}\n"));
+    assert_non_null(strstr(text, "  - {name: next-2, position_m: [4.000, 5.000, 6.000], heading_deg: 90.5}\n"));
+    free(text);
+    place[0].position_m[0] = 1;
+}
+
 /* The last lines say where it ended early. */
 static void nothing_left_to_gain(void **state)
 {
@@ -360,6 +372,7 @@ int main(void)
         cmocka_unit_test(each_line),
         cmocka_unit_test(each_line_of_next),
         cmocka_unit_test(sections_that_belong_to_a_line),
+        cmocka_unit_test(finer_places_have_more_digits),
         cmocka_unit_test(nothing_left_to_gain),
         cmocka_unit_test(other_reasons_for_no_station),
     };

@@ -10,13 +10,23 @@
 
 enum { LINE_LEN = 160 };
 
+/* Places of a grid are whole millimetres. Those of a file may be finer, and scans are from there. */
+static int digits_of(const struct coverage_next_place *p)
+{
+    int digits = 3;
+    for (int i = 0; i < 3; i++)
+        if (fabs(p->position_m[i] - 1e-3 * round(1e3 * p->position_m[i])) > 5e-7) digits = 6;
+    return digits;
+}
+
 /* An element of the list `stations`, as YAML has it on one line. */
 static const char *ready_line(const struct coverage_next_place *p, uint32_t number, char line[LINE_LEN])
 {
     char heading[40] = "";
     if (p->heading_deg != 0.0) snprintf(heading, sizeof heading, ", heading_deg: %.10g", p->heading_deg);
-    snprintf(line, LINE_LEN, "{name: next-%u, position_m: [%.3f, %.3f, %.3f]%s}", number, p->position_m[0],
-             p->position_m[1], p->position_m[2], heading);
+    const int n = digits_of(p);
+    snprintf(line, LINE_LEN, "{name: next-%u, position_m: [%.*f, %.*f, %.*f]%s}", number, n, p->position_m[0], n,
+             p->position_m[1], n, p->position_m[2], heading);
     return line;
 }
 
