@@ -63,7 +63,8 @@ double figures_nice(double v);
 struct figures_cell {
     uint64_t key;
     uint32_t n;
-    float area_m2, range_sum_m; /* the sum over its points */
+    float range_sum_m; /* over its points */
+    double area_m2;
 };
 struct figures_density_row {
     size_t cells, points;

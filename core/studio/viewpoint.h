@@ -49,7 +49,7 @@ int viewpoint_find(const struct scene *scene, const struct viewpoint_view *view,
 struct viewpoint_grid {
     double step_m;             /* of the grid along x and y; the grid is centred between min_m and max_m */
     double height_m;           /* of the head's origin above the floor */
-    double min_m[3], max_m[3]; /* prcs; floors count whose z lies between these */
+    double min_m[3], max_m[3]; /* prcs; floors count whose z lies between these, to 0.5 mm; may be infinite along z */
 };
 
 struct viewpoint_place {

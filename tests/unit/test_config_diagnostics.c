@@ -146,6 +146,9 @@ static void an_unknown_key_gets_the_nearest_one(void **state)
     /* the same word elsewhere; one that is near here comes first */
     expect_unknown("head", 0, "weight_kg",
                    "shelf.yaml:3: head.weight_kg: unknown key, did you mean tins[0].weight_kg? allowed high_m, locked");
+    expect_unknown("tins[]", 1, "head",
+                   "shelf.yaml:3: tins[1].head: unknown key, did you mean head at the top of the file? allowed "
+                   "weight_kg, name, label");
     expect_unknown("", 0, "locked", "shelf.yaml:3: locked: unknown key, did you mean head.locked? allowed head, tins");
     expect_unknown("head", 0, "colour", "shelf.yaml:3: head.colour: unknown key; allowed high_m, locked");
     expect_unknown("", 0, "xyzhead", "shelf.yaml:3: xyzhead: unknown key; allowed head, tins"); /* three letters more */

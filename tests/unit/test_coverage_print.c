@@ -16,13 +16,14 @@
 #include "firmware_sim/app/studio/coverage/coverage.h"
 #include "firmware_sim/app/studio/coverage/next.h"
 #include "firmware_sim/app/studio/page_json.h"
-#include "firmware_sim/config/places.h"
+#include "firmware_sim/config/config.h"
 
-static struct config_station named[2];
+static struct config cfg = {.n_stations = 2};
+static struct config_station *const named = cfg.station;
 static struct site_station at[2];
 static struct scene_surface surface[3];
 static struct scene scene = {.n_surfaces = 3, .surface = surface};
-static struct site site = {.scene = &scene, .station = at, .n_stations = 2};
+static struct site site = {.cfg = &cfg, .scene = &scene, .station = at, .n_stations = 2};
 static struct coverage_result_station station[2] = {{4.0, 3.0, {201, 202, 203, 204}}, {5.0, 1.5, {301, 302, 303, 304}}};
 /* The second has the largest unseen area, and the third none that is seen. */
 static struct coverage_of_label label[3] = {{10.0, 8.0, 2.0, 24}, {20.0, 5.0, 1.0, 35}, {4.0, 0.0, 0.0, 0}};
@@ -49,7 +50,7 @@ static struct coverage_next_place place[4] = {{{1, 2, 3}, 0, 1.5, 0.5, COVERAGE_
                                               {{1.5, 2.5, 3.5}, 10, 2, 1, COVERAGE_PLACE_OPEN}};
 /* Estimates differ from scans by 0.5, 0.25, 1.5 and 0.125. */
 static double estimate_m2[8] = {5.5, 3.75, 0, 1, 0, 0.5, 0, 0.125};
-static struct coverage_next_round rounds[2] = {{2, {{0, 6.0, 5.0}, {1, 4.5, 4.0}}, 3.0},
+static struct coverage_next_round rounds[3] = {{2, {{0, 6.0, 5.0}, {1, 4.5, 4.0}}, 3.0},
                                                {2, {{1, 3.5, 2.0}, {3, 0.75, 0.25}}, 1.0}};
 static struct coverage_next next = {.place = place,
                                     .n = 4,
@@ -102,7 +103,8 @@ static const char RANGES[] =
     "{\"label\":2,\"object\":\"object2\",\"material\":\"material2\",\"area_m2\":4,\"seen_m2\":0,\"seen_percent\":0,"
     "\"several_m2\":0,\"several_percent\":0,\"density_1_m2\":null}]";
 static const char NEXT[] =
-    ",\"next\":{\"directions\":1234,\"step_deg\":2.5,\"largest_difference_m2\":1.5,\"stations\":["
+    ",\"next\":{\"directions\":1234,\"step_deg\":2.5,\"largest_difference_m2\":1.5,"
+    "\"like\":\"first\",\"sections\":[],\"stations\":["
     "{\"position_m\":[1,2,3],\"heading_deg\":0,\"gain_m2\":5,\"gain_percent\":12.5,\"seen_m2\":6,\"none_m2\":3,"
     "\"none_percent\":7.5,\"station\":\"{name: next-1, position_m: [1.000, 2.000, 3.000]}\",\"tried\":["
     "{\"place\":0,\"gain_m2\":5,\"estimate_m2\":5.5,\"seen_m2\":6},"
@@ -233,6 +235,50 @@ static void each_line_of_next(void **state)
     free(text);
 }
 
+/* The scans of places have the scanner and the tripod's cone of a station, and the line for `stations` has neither. So
+ * they are named, by the station of the configuration that the third of two stations' stops is at. */
+static void sections_that_belong_to_a_line(void **state)
+{
+    static const struct {
+        int tripod, scanner;
+        const char *says, *list;
+    } rows[] = {{1, 0, "tripod\n", "[\"tripod\"]"},
+                {0, 1, "scanner\n", "[\"scanner\"]"},
+                {1, 1, "tripod and scanner\n", "[\"tripod\",\"scanner\"]"}};
+    static const char note[] =
+        "3.000]}\n    the scans have the scanner and the tripod's cone of station first: add its ";
+    (void)state;
+    result.base = 2;
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        named[0].tripod.given = rows[i].tripod;
+        named[0].has_scanner = rows[i].scanner;
+        char *text = printed(1), *from = strstr(text, note), list[80];
+        assert_non_null(from);
+        assert_memory_equal(from + strlen(note), rows[i].says, strlen(rows[i].says));
+        free(text);
+        struct web_body body;
+        struct sh_err err;
+        snprintf(list, sizeof list, ",\"like\":\"first\",\"sections\":%s,", rows[i].list);
+        assert_int_equal(page_json(put, &next, &body, &err), 0);
+        assert_non_null(strstr(body.bytes, list));
+        free(body.bytes);
+    }
+    named[0].tripod.given = named[0].has_scanner = 0;
+    result.base = 0;
+}
+
+/* A place of --candidates is scanned where it is. So its line has micrometres, and the line of a grid has millimetres. */
+static void finer_places_have_more_digits(void **state)
+{
+    (void)state;
+    place[0].position_m[0] = 7.9996;
+    char *text = printed(1);
+    assert_non_null(strstr(text, "  - {name: next-1, position_m: [7.999600, 2.000000, 3.000000]}\n"));
+    assert_non_null(strstr(text, "  - {name: next-2, position_m: [4.000, 5.000, 6.000], heading_deg: 90.5}\n"));
+    free(text);
+    place[0].position_m[0] = 1;
+}
+
 /* The last lines say where it ended early. */
 static void nothing_left_to_gain(void **state)
 {
@@ -246,12 +292,41 @@ static void nothing_left_to_gain(void **state)
     free(text);
     next.n_rounds = 0;
     next.whole_cells = 1;
+    rounds[0].n_tried = 0;
     text = printed(1);
     assert_string_equal(text,
                         "\nplaces     4 to stand at\n"
                         "estimates  1234 rays from each place, pulses of the head; each cell that they hit counts\n"
                         "\nno station: all that can be seen from these places is seen by a station already\n");
     free(text);
+}
+
+/* Nothing is said about what stations see where no place was compared, where no ray from one hits anything, and where
+ * only some places were scanned. */
+static void other_reasons_for_no_station(void **state)
+{
+    (void)state;
+    struct coverage_next_place none[2] = {{.front = 0.1, .state = COVERAGE_PLACE_WITHIN},
+                                          {.front = (double)NAN, .state = COVERAGE_PLACE_WITHIN}};
+    struct coverage_next_round round = {.n_tried = 0};
+    const struct coverage_next before = next;
+    static const struct {
+        uint32_t within, n_tried;
+        enum coverage_place second;
+        const char *says;
+    } rows[] = {{2, 0, COVERAGE_PLACE_WITHIN, "no place is left to compare;"},
+                {1, 0, COVERAGE_PLACE_OPEN, "no ray from these places hits a surface"},
+                {1, 1, COVERAGE_PLACE_CHOSEN, "whole scans from the best places add nothing\n"}};
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        none[1].state = rows[i].second;
+        if (rows[i].n_tried > 0) none[1].front = 1.0;
+        round.n_tried = rows[i].n_tried;
+        next = (struct coverage_next){.place = none, .n = 2, .within = rows[i].within, .round = &round, .n_asked = 1};
+        char *text = printed(1), *from = strstr(text, "\nno station: ");
+        if (from == NULL || strncmp(from + 13, rows[i].says, strlen(rows[i].says)) != 0) fail_msg("%zu: %s", i, text);
+        free(text);
+    }
+    next = before;
 }
 
 /* Labels stand by their unseen area, the largest first, and of equal ones as they are numbered. Neither the whole area
@@ -296,7 +371,10 @@ int main(void)
         cmocka_unit_test(keys_that_are_not_there),
         cmocka_unit_test(each_line),
         cmocka_unit_test(each_line_of_next),
+        cmocka_unit_test(sections_that_belong_to_a_line),
+        cmocka_unit_test(finer_places_have_more_digits),
         cmocka_unit_test(nothing_left_to_gain),
+        cmocka_unit_test(other_reasons_for_no_station),
     };
     return cmocka_run_group_tests(tests, name_them, NULL);
 }

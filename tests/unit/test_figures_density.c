@@ -120,12 +120,26 @@ static void cells_begin_at_the_scene_s_corner(void **state)
         density(scene, 1.0, &d);
         assert_int_equal(d.n, cloud.n / 2);
         for (size_t i = 0; i < d.n; i++) {
-            const double area_m2 = (double)d.cell[i].area_m2, want_m2 = tilted ? 1.25 : 1.0;
-            assert_true(d.cell[i].n == 2 && fabs(area_m2 - want_m2) < 1e-6); /* a float has 24 bits */
+            const double area_m2 = d.cell[i].area_m2, want_m2 = tilted ? 1.25 : 1.0;
+            assert_true(d.cell[i].n == 2 && fabs(area_m2 - want_m2) < 1e-14); /* a double has 53 bits */
         }
         figures_density_free(&d);
         scene_free(scene);
     }
+}
+
+/* The density is points / area in double precision, also where the area is no short binary number: 2 / 0.04. */
+static void the_density_is_exact(void **state)
+{
+    (void)state;
+    struct scene *scene = load_text("floor.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    struct figures_density d;
+    add(0.1, 0.1, 0, 0, 1);
+    add(0.1, 0.15, 0, 0, 1);
+    density(scene, 0.2, &d);
+    assert_true(fabs(all_of(&d).p50 - 50.0) < 1e-13 * 50.0);
+    figures_density_free(&d);
+    scene_free(scene);
 }
 
 /* Planes that are a cell or more apart have cells of their own. */
@@ -254,6 +268,7 @@ int main(void)
         cmocka_unit_test_setup(cells_grow_until_they_hold_sixteen, begin),
         cmocka_unit_test_setup(cells_of_few_points, begin),
         cmocka_unit_test_setup(cells_begin_at_the_scene_s_corner, begin),
+        cmocka_unit_test_setup(the_density_is_exact, begin),
         cmocka_unit_test_setup(planes_have_their_own_cells, begin),
         cmocka_unit_test_setup(cells_are_not_too_many, begin),
         cmocka_unit_test_setup(many_cells_are_all_kept, begin),

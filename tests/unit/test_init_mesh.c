@@ -166,6 +166,16 @@ static void axes_and_scale_are_given(void **state)
     scene_free(scene);
 }
 
+/* With y up, y is -z. The far side of a mesh that ends at z = 0 would be printed as y -0.000. */
+static void bounds_have_no_negative_zero(void **state)
+{
+    (void)state;
+    write_box((const double[3]){0, 0, -3}, (const double[3]){8, 6, 3});
+    struct scene *scene = load("y", 0);
+    assert_true(scene->min_m[1] == 0.0 && !signbit(scene->min_m[1]) && scene->max_m[1] == 3.0);
+    scene_free(scene);
+}
+
 static void a_mesh_that_is_none(void **state)
 {
     const struct init_wish wish = {.file = path};
@@ -188,9 +198,8 @@ static void a_mesh_that_is_none(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(units_are_guessed),
-        cmocka_unit_test(projected_coordinates_are_metres),
-        cmocka_unit_test(axes_and_scale_are_given),
+        cmocka_unit_test(units_are_guessed),        cmocka_unit_test(projected_coordinates_are_metres),
+        cmocka_unit_test(axes_and_scale_are_given), cmocka_unit_test(bounds_have_no_negative_zero),
         cmocka_unit_test(a_mesh_that_is_none),
     };
     return cmocka_run_group_tests_name("init mesh", tests, go, leave);

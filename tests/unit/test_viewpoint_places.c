@@ -184,6 +184,42 @@ static void floors_lie_within_the_area(void **state)
     }
 }
 
+/* A floor that a ray finds is wrong by its rounding. So limits at the floor's own height, and a room as high as the head
+ * needs, keep the floor under ceilings of many heights. Heights in whole millimetres are 1 mm apart, and limits are
+ * good to half of that. */
+static void limits_allow_for_rounding(void **state)
+{
+    (void)state;
+    static const double floor_m[] = {0, 0.1, -0.05, 0.3, 1.37, 100.3, -7.77};
+    for (size_t i = 0; i < sizeof floor_m / sizeof floor_m[0]; i++)
+        for (int k = 0; k < 40; k++) {
+            const double z_m = floor_m[i], height_m = 1.1 + 0.037 * k;
+            const struct viewpoint_grid grid = {1.0, height_m, {-0.5, -0.5, z_m}, {0.5, 0.5, z_m}};
+            add_level(2, 2, z_m);
+            add_level(2, 2, z_m + height_m + 0.2);
+            assert_int_equal(find_all(&grid, NULL), SH_OK);
+            if (n_places != 1) fail_msg("floor at %g m, head %g m above it: %u places", z_m, height_m, n_places);
+            assert_true(is_near(place[0].floor_m, z_m));
+            n_quads = 0;
+        }
+}
+
+/* A side that is a whole number of steps in decimal digits has a place for each: 0.6 / 0.2 and 3.3 / 1.1 are just below
+ * 3 in binary ones. */
+static void whole_steps_count(void **state)
+{
+    (void)state;
+    static const double side_m[][2] = {{0.6, 0.2}, {3.3, 1.1}, {0.3, 0.1}, {8, 0.1}, {2.4, 0.8}};
+    static const uint32_t along[] = {3, 3, 3, 80, 3};
+    for (size_t i = 0; i < sizeof along / sizeof along[0]; i++) {
+        const struct viewpoint_grid grid = {side_m[i][1], 1.2, {0, 0, -9}, {side_m[i][0], 1e-3, 9}};
+        add_level(9, 9, 0);
+        assert_int_equal(find_all(&grid, NULL), SH_OK);
+        if (n_places != along[i]) fail_msg("%g m in steps of %g m: %u", side_m[i][0], side_m[i][1], n_places);
+        n_quads = 0;
+    }
+}
+
 /* A grid lies in the middle of its area, and has as many steps as it holds. Places are rounded to millimetres, floors
  * are not. They come by x, then y, then from above. */
 static void the_grid_is_in_order(void **state)
@@ -250,7 +286,8 @@ int main(void)
         cmocka_unit_test(a_floor_is_not_steep),       cmocka_unit_test(low_heads_stand_too),
         cmocka_unit_test(there_is_room_above),        cmocka_unit_test(most_legs_stand),
         cmocka_unit_test(legs_stand_level),           cmocka_unit_test(the_head_is_free),
-        cmocka_unit_test(floors_lie_within_the_area), cmocka_unit_test(the_grid_is_in_order),
+        cmocka_unit_test(floors_lie_within_the_area), cmocka_unit_test(limits_allow_for_rounding),
+        cmocka_unit_test(whole_steps_count),          cmocka_unit_test(the_grid_is_in_order),
         cmocka_unit_test(the_search_can_be_stopped),
     };
     return cmocka_run_group_tests(tests, NULL, free_places);

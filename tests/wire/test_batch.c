@@ -65,6 +65,9 @@ static void test_failing(void **state)
     batch_expect(wire, "none", WITH("--sweep", "head.station=1,2"), 2, "--stations sets the station");
     batch_expect(wire, "none", WITH("--sweep", "scene.meshes.0.scale=1,2", "--set", "scene.meshes[0].scale=3"), 2,
                  "is in --set and in --sweep");
+    /* 3 x 167 x 1000 combinations at 2 stations: the first one shows that a million jobs are not enough */
+    batch_expect(wire, "none", WITH("--sweep", "noise.seed=1:1000:1", "--sweep", "head.lines_hz=40:123:0.5"), 2,
+                 "501000 combinations of --sweep at 2 stations are 1002000 jobs; allowed are 1000000");
     assert_int_not_equal(access(wire_path(wire, "none"), F_OK), 0); /* nothing was begun */
 }
 
@@ -79,6 +82,8 @@ static void test_chosen_stations(void **state)
     wire_expect_usage(wire, WITH("batch", config, "-o", "x", "--format", "ply", "--list", "--stations", "2"),
                       "head.frames");
     wire_expect_usage(wire, WITH("batch", config, "-o", "x", "--format", "ply", "--list"), "head.frames");
+    wire_expect_usage(wire, WITH("batch", config, "-o", "x", "--format", "las,ply,.las", "--list"),
+                      "batch: --format las,ply,.las: the ending las is given twice; allowed once");
 }
 
 /* Jobs are counted from 1 over all shards; a job's shard is its number modulo their count (batch.h). */

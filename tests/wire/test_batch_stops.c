@@ -91,6 +91,25 @@ static void test_interrupted(void **state)
     assert_int_equal(rmdir(wire_path(wire, "long")), 0);
 }
 
+/* A signal that comes once the last file of the last job is there leaves nothing to do, or that job: what is said and
+ * the status agree. */
+static void test_interrupted_at_the_end(void **state)
+{
+    struct wire *wire = *state;
+    assert_int_equal(mkdir(wire_path(wire, "end"), 0700), 0);
+    const int notify = inotify_init1(IN_CLOEXEC);
+    assert_true(inotify_add_watch(notify, wire_path(wire, "end"), IN_MOVED_TO) >= 0);
+    const pid_t pid = batch_start(wire, "end", WITH("--quiet"));
+    assert_true(wait_for(notify, pid, ".las", BATCH_JOBS));
+    kill(pid, SIGTERM);
+    const int status = wire_wait(wire, pid);
+    close(notify);
+    char *err = wire_read(wire_path(wire, "err"), NULL);
+    if ((status == 0) != (strstr(err, "interrupted") == NULL) || strstr(err, "6 of 6") != NULL)
+        fail_msg("status %d: %s", status, err);
+    free(err);
+}
+
 /* ---- files that are not whole any more */
 
 static void spoil(const struct wire *wire, int job, const char *ending, off_t cut, off_t flip)
@@ -203,6 +222,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(test_killed, batch_setup_with_ref, batch_teardown),
         cmocka_unit_test_setup_teardown(test_interrupted, batch_setup, batch_teardown),
+        cmocka_unit_test_setup_teardown(test_interrupted_at_the_end, batch_setup, batch_teardown),
         cmocka_unit_test_setup_teardown(test_spoilt, batch_setup_with_ref, batch_teardown),
         cmocka_unit_test_setup_teardown(test_nothing_is_mixed, batch_setup, batch_teardown),
         cmocka_unit_test_setup_teardown(test_locked, batch_setup, batch_teardown),

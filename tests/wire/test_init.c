@@ -170,6 +170,32 @@ static void unit_and_axes_can_be_given(void **state)
     forget();
 }
 
+/* A tetrahedron of 8 x 6 x 4 units of half a metre, z up. Its reader makes metres and y up of them, so --scale is a factor
+ * of the file's metres. */
+static void collada_is_converted(void **state)
+{
+    struct wire *wire = *state;
+    static const char dae[] =
+        "<?xml version=\"1.0\"?><COLLADA xmlns=\"http://www.collada.org/2005/11/COLLADASchema\" version=\"1.4.1\">"
+        "<asset><unit meter=\"0.5\"/><up_axis>Z_UP</up_axis></asset>"
+        "<library_geometries><geometry id=\"g\"><mesh>"
+        "<source id=\"p\"><float_array id=\"a\" count=\"12\">0 0 0 8 0 0 0 6 0 0 0 4</float_array>"
+        "<technique_common><accessor source=\"#a\" count=\"4\" stride=\"3\"><param name=\"X\" type=\"float\"/>"
+        "<param name=\"Y\" type=\"float\"/><param name=\"Z\" type=\"float\"/></accessor></technique_common></source>"
+        "<vertices id=\"v\"><input semantic=\"POSITION\" source=\"#p\"/></vertices>"
+        "<triangles count=\"4\"><input semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/>"
+        "<p>0 2 1 0 1 3 1 2 3 2 0 3</p></triangles></mesh></geometry></library_geometries>"
+        "<library_visual_scenes><visual_scene id=\"s\"><node id=\"n\"><instance_geometry url=\"#g\"/></node>"
+        "</visual_scene></library_visual_scenes><scene><instance_visual_scene url=\"#s\"/></scene></COLLADA>";
+    wire_write_text(wire, "t.dae", dae);
+    assert_int_equal(RUN(wire, "init", "t.dae"), 0);
+    contains(out, "size      4 x 3 x 2 m");
+    contains(out, "unit      1 m, the file is converted to it\naxes      y up, the file is converted to it\n");
+    assert_int_equal(RUN(wire, "init", "t.dae", "--scale", "2", "--force"), 0);
+    contains(out, "size      8 x 6 x 4 m");
+    forget();
+}
+
 /* Boxes of 10 m stand a kilometre from each other, in units of a metre from an origin. */
 static void write_city(const struct wire *wire, const char *name, double x, double y, double z)
 {
@@ -298,6 +324,17 @@ static void what_is_there_stays(void **state)
     free(yaml);
     assert_int_equal(RUN(wire, "init", "room.obj", "--force"), 0);
     assert_int_equal(RUN(wire, "check", "room.yaml"), 0);
+    /* What is written stays where nothing can be printed, and the command says so. */
+    char room[512], other[512];
+    snprintf(room, sizeof room, "%s", wire_path(wire, "room.obj"));
+    snprintf(other, sizeof other, "%s", wire_path(wire, "other.yaml"));
+    const char *const closed[] = {"-c", "exec \"$0\" \"$@\" >&-", wire_program(), "init", room, "-o", other, NULL};
+    assert_int_equal(wire_wait(wire, wire_spawn_program(wire, "/bin/sh", closed, "out", "err", -1)), 1);
+    forget();
+    text = wire_read(wire_path(wire, "err"), NULL);
+    contains(text, "scanhead: standard output: Bad file descriptor; ");
+    contains(text, "/other.yaml is written\n");
+    assert_int_equal(RUN(wire, "check", "other.yaml"), 0);
     forget();
 }
 
@@ -389,6 +426,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(names_may_have_any_bytes, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(a_body_is_looked_at, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(the_path_of_the_mesh_starts_at_the_configuration, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(collada_is_converted, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(what_is_there_stays, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(wrong_use_says_what_is_allowed, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(a_scan_of_nothing_is_told, wire_setup, wire_teardown),

@@ -51,7 +51,7 @@ static char *report(struct wire *wire, const char *name, const char *const *sets
     char config[256], cloud[256];
     prepare(wire, config);
     snprintf(cloud, sizeof cloud, "%s", wire_path(wire, name));
-    const char *const args[] = {"report", config, cloud, "--json", "--tolerance-m", "1", NULL};
+    const char *const args[] = {"report", config, cloud, "--json", "--tolerance-m", "1", "--quiet", NULL};
     if (run(wire, "report.json", args, sets) != 0) {
         wire_show(wire, "err");
         fail_msg("report of %s", name);
@@ -215,7 +215,7 @@ static void stations_are_judged_by_their_scanners(void **state)
     snprintf(config, sizeof config, "%s", wire_write_text(wire, "two.yaml", two));
     snprintf(cloud, sizeof cloud, "%s", wire_path(wire, "two.las"));
     const char *const scan[] = {"record", config, "--station", "all", "-o", cloud, "--quiet", NULL};
-    const char *const args[] = {"report", config, cloud, "--json", "--tolerance-m", "1", NULL};
+    const char *const args[] = {"report", config, cloud, "--json", "--tolerance-m", "1", "--quiet", NULL};
     assert_int_equal(run(wire, "out", scan, NULL), 0);
     assert_int_equal(run(wire, "report.json", args, NULL), 0);
     char *json = wire_read(wire_path(wire, "report.json"), NULL);

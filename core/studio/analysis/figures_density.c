@@ -75,7 +75,7 @@ static int figures_density_add(struct table *t, uint64_t key, double area_m2, do
     }
     struct figures_cell *c = &t->cell[slot_of(t, key)];
     if (c->n == 0) {
-        *c = (struct figures_cell){.key = key, .area_m2 = (float)area_m2};
+        *c = (struct figures_cell){.key = key, .area_m2 = area_m2};
         t->used++;
     }
     if (c->n == UINT32_MAX) return 0;
@@ -107,7 +107,7 @@ static int figures_density_fill(const struct figures_on_scene *in, const struct 
 
 static double density_of(const struct figures_cell *c)
 {
-    return (double)c->n / (double)c->area_m2;
+    return (double)c->n / c->area_m2;
 }
 
 static int by_density(const void *a, const void *b)

@@ -15,6 +15,8 @@ static const double ABOVE_M = 0.2, AROUND_M = 0.3, LEVEL_M = 0.15;
 /* The rays of a place begin at least so far above its floor: the floor around it may be LEVEL_M higher. ABOVE_M says
  * that there is room for that. */
 static const double LEAST_LOOK_M = 0.16;
+/* Surfaces are found by rays, with their rounding. Heights in whole millimetres are compared to half of one. */
+static const double NEAR_M = 5e-4;
 
 struct search {
     struct survey survey;
@@ -45,8 +47,8 @@ static int take_surface(void *ctx, uint32_t i, double z_m)
     struct search *s = ctx;
     const struct survey_column *c = &s->column[i];
     const struct viewpoint_place floor = {{to_mm(c->x_m), to_mm(c->y_m), to_mm(z_m + s->grid->height_m)}, z_m};
-    const int has_room = c->last_m - z_m >= s->grid->height_m + ABOVE_M;
-    const int asked_for = z_m >= s->grid->min_m[2] && z_m <= s->grid->max_m[2];
+    const int has_room = c->last_m - z_m >= s->grid->height_m + ABOVE_M - NEAR_M;
+    const int asked_for = z_m >= s->grid->min_m[2] - NEAR_M && z_m <= s->grid->max_m[2] + NEAR_M;
     if (!has_room || !asked_for || fabs(survey_cosine(&s->survey, i)) < LEVEL) return 1;
     return places_keep(&s->floor, &s->n_floors, &s->floor_room, &floor);
 }
@@ -133,8 +135,8 @@ static int check_grid(struct search *s, struct sh_err *err)
 {
     const struct viewpoint_grid *g = s->grid;
     double n[2];
-    for (int i = 0; i < 2; i++)
-        n[i] = fmax(floor((g->max_m[i] - g->min_m[i]) / g->step_m), 1.0);
+    for (int i = 0; i < 2; i++) /* 0.6 / 0.2 is just below 3 */
+        n[i] = fmax(floor((g->max_m[i] - g->min_m[i]) / g->step_m + 1e-9), 1.0);
     if (n[0] * n[1] > VIEWPOINT_MAX_PLACES)
         return sh_fail(err, SH_EINPUT, "a grid of %.0f by %.0f places; allowed are %d: use a step of at least %.2g m",
                        n[0], n[1], VIEWPOINT_MAX_PLACES, digits_up(least_step_m(g), 2));

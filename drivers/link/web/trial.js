@@ -221,7 +221,7 @@ export class Trial extends EventTarget {
       const found = JSON.parse(new TextDecoder().decode(await ask(this.#about('next'), this.#ended.signal)));
       if (!this.#on || before !== this.#stamp()) return undefined; // something has moved meanwhile
       this.next = found.place ? {...found.place, pitch_deg: 0, roll_deg: 0, gain_m2: found.gain_m2, none_m2: found.none_m2} : null;
-      this.nextError = found.place ? '' : 'No place would add anything.';
+      this.nextError = found.place ? '' : found.places ? 'No place would add anything.' : 'All places see mostly the backs of faces.';
       this.#renewed = 0;
     } catch (error) {
       if (!this.#on || before !== this.#stamp()) return undefined;

@@ -197,6 +197,8 @@ int cfg_fail_unknown(struct cfg_reader *rd, int line, const char *parent, uint32
     const struct cfg_key *near = suggest(&rd->table, parent, word);
     if (near == NULL) return cfg_fail(rd, line, name, "unknown key; allowed %s", known);
     rd->bad[cfg_row(rd, near)][strstr(near->path, "[]") != NULL ? item : 0] = 1;
-    return cfg_fail(rd, line, name, "unknown key, did you mean %s? allowed %s", cfg_name(near->path, item, hint),
-                    known);
+    const int at_top =
+        section[0] != '\0' && strchr(near->path, '.') == NULL; /* the same word, outside of this section */
+    return cfg_fail(rd, line, name, "unknown key, did you mean %s%s? allowed %s", cfg_name(near->path, item, hint),
+                    at_top ? " at the top of the file" : "", known);
 }

@@ -27,6 +27,9 @@ static int read_format(struct batch *b)
         if (*p == '\0' || strchr(p, '/') != NULL || b->n_endings == RECORD_MAX_FILES)
             return app_usage(&app_batch, "--format %s: allowed are up to %d endings of record, as in ply,las",
                              b->format, RECORD_MAX_FILES);
+        for (int i = 0; i < b->n_endings; i++)
+            if (strcmp(b->ending[i], p) == 0)
+                return app_usage(&app_batch, "--format %s: the ending %s is given twice; allowed once", b->format, p);
         b->ending[b->n_endings++] = p;
     }
     return APP_OK;

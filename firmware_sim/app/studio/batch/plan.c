@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "firmware_sim/app/studio/batch/batch.h"
 
+#include <inttypes.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -125,6 +126,16 @@ static int check_epoch(const struct config *cfg, struct sh_err *err)
         cfg->file, cfg->time.epoch);
 }
 
+/* Whether each combination has as many jobs as the first one. Values of these keys may change the number of stations
+ * or stops. */
+static int jobs_are_even(const struct batch *b)
+{
+    for (uint32_t i = 0; i < b->sweeps.n && b->stations.all; i++)
+        if (strncmp(b->sweeps.sweep[i].key, "stations", 8) == 0 || strncmp(b->sweeps.sweep[i].key, "platform", 8) == 0)
+            return 0;
+    return 1;
+}
+
 static int add_jobs(struct batch *b, uint32_t combination, uint32_t n_stations, struct sh_err *err)
 {
     const struct batch_stations *s = &b->stations;
@@ -133,6 +144,11 @@ static int add_jobs(struct batch *b, uint32_t combination, uint32_t n_stations, 
         return sh_fail(err, SH_EINPUT, "--stations %s: there is no station %u; allowed 1 to %u", b->stations_text, last,
                        n_stations);
     if (b->n_jobs + (uint64_t)n > BATCH_MAX_JOBS) return sh_fail(err, SH_EINPUT, "more than %d jobs", BATCH_MAX_JOBS);
+    if (jobs_are_even(b) && b->n_combinations * (uint64_t)n > BATCH_MAX_JOBS)
+        return sh_fail(err, SH_EINPUT,
+                       "%u combinations of --sweep at %u stations are %" PRIu64 " jobs; allowed are %d: "
+                       "give fewer values, or some of the --stations",
+                       b->n_combinations, n, b->n_combinations * (uint64_t)n, BATCH_MAX_JOBS);
     if (!grow(&b->job, &b->job_room, b->n_jobs + n, sizeof *b->job))
         return sh_fail(err, SH_ENOMEM, "no memory for %u jobs", b->n_jobs + n);
     for (uint32_t i = 0; i < n; i++)

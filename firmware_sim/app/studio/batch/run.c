@@ -190,7 +190,7 @@ static int say_end(const struct runner *r)
 {
     const struct batch *b = r->b;
     const uint32_t done = r->n_mine - r->n_todo + r->n_did;
-    if (app_interrupted())
+    if (app_interrupted() && done < r->n_mine) /* a signal may come after the last job */
         fprintf(stderr,
                 "scanhead: interrupted: %u of %u jobs of shard %u/%u are done; the same command does the rest\n", done,
                 r->n_mine, b->shard, b->n_shards);

@@ -312,8 +312,9 @@ static const char NOTES[] =
     "sees most area that no station sees. A place of the grid is a floor of at most 20 degrees, with room for the\n"
     "head and a tripod. Places are compared by rays. The best ones of each round are scanned as a whole, and the\n"
     "gains of these scans decide. Places that see mostly backs of faces lie within bodies. They are left out if the\n"
-    "stations see mostly fronts. The line below the table can be copied into `stations`. Mesh, figures and labels\n"
-    "are those of the present stations.\n";
+    "stations see mostly fronts. The line below the table can be copied into `stations`. The scans have the scanner\n"
+    "of that station, and its tripod's cone as it opens there, so its sections scanner and tripod are to be copied,\n"
+    "too. Mesh, figures and labels are those of the present stations.\n";
 
 const struct app_command app_coverage = {
     .name = "coverage",

@@ -8,10 +8,10 @@
 enum { COVERAGE_MOST_NEXT = 100, COVERAGE_MOST_SCANS = 20 };
 
 struct coverage_next_options {
-    long stations;          /* how many to find; 0: none */
-    double grid_m;          /* 0: no grid */
-    double height_m;        /* above the floor */
-    double area_m[2][3];    /* limits of the grid: [least, most][x, y, floor]; NaN: those of the scene */
+    long stations;       /* how many to find; 0: none */
+    double grid_m;       /* 0: no grid */
+    double height_m;     /* above the floor */
+    double area_m[2][3]; /* limits of the grid: [least, most][x, y, floor]; NaN: those of the scene, none for floors */
     const char *candidates; /* a file of places instead; NULL: none */
     double step_deg;        /* between rays */
     int step_given;         /* --step-deg is there, which is an error where rays are pulses of the head */

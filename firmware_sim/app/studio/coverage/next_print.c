@@ -6,17 +6,35 @@
 
 #include "firmware_sim/app/studio/coverage/next.h"
 #include "firmware_sim/app/studio/page_json.h"
+#include "firmware_sim/config/config.h"
 
 enum { LINE_LEN = 160 };
+
+/* Places of a grid are whole millimetres. Those of a file may be finer, and scans are from there. */
+static int digits_of(const struct coverage_next_place *p)
+{
+    int digits = 3;
+    for (int i = 0; i < 3; i++)
+        if (fabs(p->position_m[i] - 1e-3 * round(1e3 * p->position_m[i])) > 5e-7) digits = 6;
+    return digits;
+}
 
 /* An element of the list `stations`, as YAML has it on one line. */
 static const char *ready_line(const struct coverage_next_place *p, uint32_t number, char line[LINE_LEN])
 {
     char heading[40] = "";
     if (p->heading_deg != 0.0) snprintf(heading, sizeof heading, ", heading_deg: %.10g", p->heading_deg);
-    snprintf(line, LINE_LEN, "{name: next-%u, position_m: [%.3f, %.3f, %.3f]%s}", number, p->position_m[0],
-             p->position_m[1], p->position_m[2], heading);
+    const int n = digits_of(p);
+    snprintf(line, LINE_LEN, "{name: next-%u, position_m: [%.*f, %.*f, %.*f]%s}", number, n, p->position_m[0], n,
+             p->position_m[1], n, p->position_m[2], heading);
     return line;
+}
+
+/* The sections of the station whose scanner and tripod's cone the scans have. The line of a place lacks them. */
+static const struct config_station *like_of(const struct coverage_result *result)
+{
+    const struct config *cfg = result->site->cfg;
+    return &cfg->station[result->base % cfg->n_stations]; /* stops go through all stations, round after round */
 }
 
 static double estimate_of(const struct coverage_next *next, uint32_t round, uint32_t place)
@@ -55,6 +73,25 @@ static void print_round(const struct coverage_next *next, const struct coverage_
     printf("with the first of them %.3f m2 (%.3f %%) are seen by no station:\n  - %s\n", r->none_m2,
            coverage_percent(r->none_m2, result->sums.area_m2),
            ready_line(&next->place[r->tried[0].place], number + 1, line));
+    const struct config_station *like = like_of(result);
+    if (like->tripod.given || like->has_scanner)
+        printf("    the scans have the scanner and the tripod's cone of station %s: add its %s\n", like->name,
+               !like->has_scanner    ? "tripod"
+               : !like->tripod.given ? "scanner"
+                                     : "tripod and scanner");
+}
+
+/* Says why a round has chosen no place. */
+static const char *why_none(const struct coverage_next *next)
+{
+    int sees = 0;
+    for (uint32_t i = 0; i < next->n; i++)
+        sees |= next->place[i].state != COVERAGE_PLACE_WITHIN && !isnan(next->place[i].front);
+    if (next->within == next->n)
+        return "no place is left to compare; try --at, --candidates, or a mesh whose faces are turned round";
+    if (!sees) return "no ray from these places hits a surface within the head's ranges; try --at or --candidates";
+    if (next->round[next->n_rounds].n_tried > 0) return "whole scans from the best places add nothing";
+    return "all that can be seen from these places is seen by a station already";
 }
 
 void coverage_next_print(const struct coverage_next *next, const struct coverage_result *result)
@@ -73,8 +110,7 @@ void coverage_next_print(const struct coverage_next *next, const struct coverage
     for (uint32_t i = 0; i < next->n_rounds; i++)
         print_round(next, result, i);
     if (next->n_rounds < next->n_asked)
-        printf("\nno %sstation: all that can be seen from these places is seen by a station already\n",
-               next->n_rounds > 0 ? "further " : "");
+        printf("\nno %sstation: %s\n", next->n_rounds > 0 ? "further " : "", why_none(next));
 }
 
 static void put_round(struct json *json, const struct coverage_next *next, const struct coverage_result *result,
@@ -123,10 +159,16 @@ static void put_place(struct json *json, const struct coverage_next *next, uint3
 
 void coverage_next_put(struct json *json, const struct coverage_next *next, const struct coverage_result *result)
 {
+    const struct config_station *like = like_of(result);
     json_open_object(json, "next");
     json_uint(json, "directions", next->directions);
     json_double(json, "step_deg", next->whole_cells ? (double)NAN : next->step_deg);
     json_double(json, "largest_difference_m2", largest_error_m2(next));
+    json_string(json, "like", like->name);
+    json_open_array(json, "sections");
+    if (like->tripod.given) json_string(json, NULL, "tripod");
+    if (like->has_scanner) json_string(json, NULL, "scanner");
+    json_close_array(json);
     json_open_array(json, "stations");
     for (uint32_t i = 0; i < next->n_rounds; i++)
         put_round(json, next, result, i);

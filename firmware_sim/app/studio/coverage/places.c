@@ -52,9 +52,10 @@ static int find_on_grid(struct coverage_finder *f, struct sh_err *err)
     struct viewpoint_grid grid = {.step_m = f->o->grid_m, .height_m = f->o->height_m};
     struct viewpoint_place *found = NULL;
     uint32_t n = 0;
-    for (int i = 0; i < 3; i++) {
-        grid.min_m[i] = isnan(f->o->area_m[0][i]) ? scene->min_m[i] : f->o->area_m[0][i];
-        grid.max_m[i] = isnan(f->o->area_m[1][i]) ? scene->max_m[i] : f->o->area_m[1][i];
+    for (int i = 0; i < 3; i++) { /* the lowest floor that a ray finds may lie below the scene, by its rounding */
+        const double low_m = i == 2 ? -INFINITY : scene->min_m[i], high_m = i == 2 ? INFINITY : scene->max_m[i];
+        grid.min_m[i] = isnan(f->o->area_m[0][i]) ? low_m : f->o->area_m[0][i];
+        grid.max_m[i] = isnan(f->o->area_m[1][i]) ? high_m : f->o->area_m[1][i];
     }
     int rc = check_upright(f, err);
     if (rc == SH_OK) rc = viewpoint_places(f->site->bvh, &grid, f->report, &found, &n, err);

@@ -151,7 +151,8 @@ static void put_operand(const char *path)
     putchar('\'');
 }
 
-static void say_result(const struct init_run *run, const struct scene *s, const struct viewpoint *at)
+/* The file stays where this can't be printed, and a second call needs --force. So the error says so. */
+static int say_result(const struct init_run *run, const struct scene *s, const struct viewpoint *at, struct sh_err *err)
 {
     char where[128];
     const double *p = at->position_m;
@@ -169,6 +170,8 @@ static void say_result(const struct init_run *run, const struct scene *s, const 
     printf("written   %s; next: scanhead record ", run->output);
     put_operand(run->output);
     puts(" -o scan.ply");
+    const char *why = app_write_failure(stdout);
+    return why == NULL ? SH_OK : sh_fail(err, SH_EIO, "standard output: %s; %s is written", why, run->output);
 }
 
 static int write_config(struct init_run *run, const struct scene *scene, struct sh_err *err)
@@ -190,8 +193,7 @@ static int write_config(struct init_run *run, const struct scene *scene, struct 
                              .at = &at};
     init_choose_scan(&profile, &at, &text.scan);
     rc = write_checked(run, &text, err);
-    if (rc == SH_OK) say_result(run, scene, &at);
-    return rc;
+    return rc == SH_OK ? say_result(run, scene, &at, err) : rc;
 }
 
 /* ---- the command */
@@ -255,7 +257,7 @@ static const struct app_option OPTIONS[] = {
     {APP_FLAG, "force", NULL, .at = AT(force), .help = "replace FILE.yaml if it exists"},
     {APP_TEXT, "up", "y|z", .at = AT(wish.up), .help = "the axis that points up, in place of the one in the file"},
     {APP_NUMBER, "scale", "M", .min = 1e-9, .max = 1e9, .at = AT(wish.scale),
-     .help = "metres per unit, in place of the value in the file"},
+     .help = "metres per unit, in place of the value in the file; for Collada and IFC a factor of the file's metres"},
     OPTION_END
 };
 /* clang-format on */

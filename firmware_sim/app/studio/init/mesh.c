@@ -26,8 +26,10 @@ double init_largest_m(const struct scene *scene)
     return size;
 }
 
+/* Collada and IFC have units of the file, and Collada has axes, too. Their readers convert all to metres and y up. */
 static const char *said_by(const char *file)
 {
+    if (text_has_ending(file, ".dae") || text_has_ending(file, ".ifc")) return "the file is converted to it";
     return text_has_ending(file, ".fbx") ? "as the file says" : "as the format defines it";
 }
 
@@ -144,9 +146,9 @@ static void mesh_turn(struct scene *scene, const struct init_mesh *as, double sc
         for (int k = 0; k < 3; k++)
             v[k] = turned[k] * scale;
     }
-    for (int k = 0; k < 3; k++) {
-        scene->min_m[k] = min[k] * scale;
-        scene->max_m[k] = max[k] * scale;
+    for (int k = 0; k < 3; k++) { /* no -0 */
+        scene->min_m[k] = min[k] * scale + 0.0;
+        scene->max_m[k] = max[k] * scale + 0.0;
     }
 }
 

@@ -37,8 +37,9 @@ static int report_report(struct config *cfg, void *ctx, struct sh_err *err)
 
 static int report_run(int argc, char **argv)
 {
-    struct report r = {.tolerance_m = 0.001, .max_m = 10};
+    struct report r = {.report = app_report_seconds, .tolerance_m = 0.001, .max_m = 10};
     int status = app_parse(&app_report, argc, argv, &r.in, &r);
+    if (r.quiet) r.report.progress = NULL;
     if (status == APP_GO_ON && r.tolerance_m > r.max_m)
         status = app_usage(&app_report, "--tolerance-m %g is more than --max-m %g", r.tolerance_m, r.max_m);
     if (status == APP_GO_ON && r.html_path != NULL && !app_ends_in(r.html_path, ".html") &&
@@ -67,6 +68,7 @@ static const struct app_option OPTIONS[] = {
     {APP_TEXT, "html", "FILE.html", .at = AT(html_path), .file = APP_WRITES,
      .help = "also write a page with tables and pictures: one file, which needs no other files"},
     OPTION_SET,
+    {APP_FLAG, "quiet", NULL, .at = AT(quiet), .help = "no progress"},
     OPTION_END
 };
 /* clang-format on */

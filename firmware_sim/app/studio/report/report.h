@@ -50,7 +50,8 @@ struct report_figures {
 struct report {
     struct app_input in;
     const char *cloud_path, *html_path;
-    int json;
+    int json, quiet;
+    struct sh_report report; /* of the work; with --quiet without progress */
     double tolerance_m, max_m, cell_m;
     struct timespec modified; /* of the cloud's file */
     struct config *cfg;
