@@ -173,6 +173,38 @@ static void test_long_front(void **state)
     unlink(path);
 }
 
+/* Returns the lowest descriptor that is free. It is higher after each file that was left open. */
+static int lowest_free(void)
+{
+    const int fd = dup(STDERR_FILENO);
+    assert_true(fd >= 0);
+    close(fd);
+    return fd;
+}
+
+/* No file stays open, whether it is a capture, is none, or is damaged. */
+static void test_files_are_closed(void **state)
+{
+    (void)state;
+    static const uint8_t junk[64] = {0x0a, 0x0d, 0x0d, 0x0a};
+    const int free_fd = lowest_free();
+    for (int kind = 0; kind < 3; kind++) {
+        struct replay_capture *capture = NULL;
+        struct sh_err err = {0};
+        made_begin(&m);
+        made_connect(&m, 3);
+        made_say(&m, 5, 1, "hello\n");
+        if (kind == 1) memcpy(m.bytes, junk, sizeof junk);
+        const char *path = made_write(&m, kind == 2 ? 0 : m.len);
+        assert_int_equal(capture_is(path), kind == 0);
+        assert_int_equal(lowest_free(), free_fd);
+        assert_int_equal(capture_load(path, NULL, &capture, &err) == SH_OK, kind == 0);
+        assert_int_equal(lowest_free(), free_fd);
+        capture_free(capture);
+        unlink(path);
+    }
+}
+
 /* Packets of a link type that is not read are left out; where nothing else is there, the file is refused. */
 static void test_unknown_link(void **state)
 {
@@ -328,6 +360,7 @@ int main(void)
         cmocka_unit_test(test_swapped_beginning),
         cmocka_unit_test(test_scans_stop),
         cmocka_unit_test(test_long_front),
+        cmocka_unit_test(test_files_are_closed),
         cmocka_unit_test(test_unknown_link),
         cmocka_unit_test(test_stopped),
     };
