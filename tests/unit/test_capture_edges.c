@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include "drivers/protocol/pcapng.h"
+#include "tests/common/free_fd.h"
 #include "tests/unit/talk_rig.h"
 
 static struct made m;
@@ -173,21 +174,12 @@ static void test_long_front(void **state)
     unlink(path);
 }
 
-/* Returns the lowest descriptor that is free. It is higher after each file that was left open. */
-static int lowest_free(void)
-{
-    const int fd = dup(STDERR_FILENO);
-    assert_true(fd >= 0);
-    close(fd);
-    return fd;
-}
-
 /* No file stays open, whether it is a capture, is none, or is damaged. */
 static void test_files_are_closed(void **state)
 {
     (void)state;
     static const uint8_t junk[64] = {0x0a, 0x0d, 0x0d, 0x0a};
-    const int free_fd = lowest_free();
+    const int before = free_fd();
     for (int kind = 0; kind < 3; kind++) {
         struct replay_capture *capture = NULL;
         struct sh_err err = {0};
@@ -197,9 +189,9 @@ static void test_files_are_closed(void **state)
         if (kind == 1) memcpy(m.bytes, junk, sizeof junk);
         const char *path = made_write(&m, kind == 2 ? 0 : m.len);
         assert_int_equal(capture_is(path), kind == 0);
-        assert_int_equal(lowest_free(), free_fd);
+        assert_int_equal(free_fd(), before);
         assert_int_equal(capture_load(path, NULL, &capture, &err) == SH_OK, kind == 0);
-        assert_int_equal(lowest_free(), free_fd);
+        assert_int_equal(free_fd(), before);
         capture_free(capture);
         unlink(path);
     }
