@@ -267,7 +267,7 @@ void app_warn_empty(uint64_t pulses, uint64_t empty, uint64_t faint)
 {
     if (empty > pulses) return; /* a stream may be damaged */
     const uint64_t with_echo = pulses - empty;
-    if (pulses == 0 || with_echo >= pulses / 20) return;
+    if (with_echo >= pulses / 20) return;
     sh_warn(&app_report_stderr, "mostly empty: %llu of %llu pulses have an echo, %.2g %%; %llu hits were not detected",
             (unsigned long long)with_echo, (unsigned long long)pulses, 100.0 * (double)with_echo / (double)pulses,
             (unsigned long long)faint);

@@ -6,14 +6,17 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "tests/common/free_fd.h"
 #include "tests/unit/output_rig.h"
 
 static char folder[64], back[512];
+static int fd_before;
 char *on_out, *on_err;
 
 int commands_begin(void)
 {
     char heads[600];
+    fd_before = free_fd();
     if (getcwd(back, sizeof back) == NULL) return -1;
     snprintf(heads, sizeof heads, "%s/config/heads", back);
     setenv("SCANHEAD_HEADS", heads, 1);
@@ -28,7 +31,7 @@ int commands_end(void **state)
     free(on_out);
     free(on_err);
     snprintf(command, sizeof command, "rm -r '%s'", folder);
-    return chdir(back) != 0 || system(command) != 0;
+    return chdir(back) != 0 || system(command) != 0 ? -1 : free_fd_check(fd_before);
 }
 
 void write_text(const char *name, const char *text)

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "firmware_sim/config/load.h"
+#include "tests/common/free_fd.h"
 #include "tests/unit/config_rig.h"
 
 const char base[] = "head:\n"                     /* 1 */
@@ -24,6 +25,7 @@ char dir[64], config_path[128];
 struct config *cfg;
 struct sh_err err;
 struct config_diagnostics diagnostics;
+static int fd_before;
 
 void write_file(const char *path, const void *bytes, size_t len)
 {
@@ -157,6 +159,7 @@ int set_up(void **state)
 {
     (void)state;
     char path[512];
+    fd_before = free_fd();
     snprintf(dir, sizeof dir, "/tmp/test_config.XXXXXX");
     if (mkdtemp(dir) == NULL || getcwd(path, sizeof path - 16) == NULL) return -1;
     strcat(path, "/config/heads");
@@ -182,5 +185,5 @@ int tear_down(void **state)
         snprintf(path, sizeof path, "%s/%s", dir, made[i]);
         remove(path);
     }
-    return 0;
+    return free_fd_check(fd_before);
 }

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/config/load.h"
+#include "tests/common/free_fd.h"
 #include "tests/unit/device_rig.h"
 
 char folder[64];
 char journal_path[96];
+static int fd_before;
 
 int write_scene(uint32_t n_objects)
 {
@@ -62,6 +64,7 @@ int make_folder(void **state)
 {
     (void)state;
     strcpy(folder, "/tmp/scanhead-device-XXXXXX");
+    fd_before = free_fd();
     if (mkdtemp(folder) == NULL) return -1;
     snprintf(journal_path, sizeof journal_path, "%s/journal", folder);
     return write_profile() != 0 || write_config() != 0 || write_scene(2) != 0 ? -1 : 0;
@@ -76,7 +79,7 @@ int remove_folder(void **state)
         snprintf(path, sizeof path, "%s/%s", folder, names[i]);
         unlink(path);
     }
-    return rmdir(folder);
+    return rmdir(folder) != 0 ? -1 : free_fd_check(fd_before);
 }
 
 void need(int rc, const struct sh_err *err)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "tests/unit/recorder_rig.h"
 
-#include <fcntl.h>
+#include "tests/common/free_fd.h"
 
 static char rig_dir[] = "/tmp/test_recorder_XXXXXX";
 
@@ -116,14 +116,6 @@ static void rig_warn(void *ctx, const char *text)
     snprintf(rig_notes + at, sizeof rig_notes - at, "%s\n", text);
 }
 
-int rig_free_fd(void)
-{
-    const int fd = fcntl(STDERR_FILENO, F_DUPFD, 0);
-    assert_true(fd >= 0);
-    close(fd);
-    return fd;
-}
-
 int rig_record(const char *path, struct recorder_options options, int keep, struct sh_err *err)
 {
     const struct sh_report report = {.warn = rig_warn, .stop = rig_stop};
@@ -133,7 +125,7 @@ int rig_record(const char *path, struct recorder_options options, int keep, stru
     if (rig_stream != NULL) fclose(rig_stream);
     rig_stream = NULL;
     rig_notes[0] = 0;
-    const int free_fd = rig_free_fd();
+    const int before = free_fd();
     options.report = &report;
     const struct recorder_ops *ops = recorder_find(path, err);
     assert_non_null(ops);
@@ -147,7 +139,7 @@ int rig_record(const char *path, struct recorder_options options, int keep, stru
         if (rc == 0) rc = closed;
     }
     scanhead_close(sh);
-    assert_int_equal(rig_free_fd(), free_fd);
+    assert_int_equal(free_fd(), before);
     return rc;
 }
 

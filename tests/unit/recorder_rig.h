@@ -53,10 +53,6 @@ void rig_points(uint32_t line, uint64_t line_pulse0, uint64_t pulse0, const stru
 /* keep: RIG_KEEP_ALWAYS keeps the received points also after a failure, as `record` does. */
 enum { RIG_KEEP = 1, RIG_KEEP_ALWAYS = 2 };
 
-/* Returns the lowest descriptor that is free. It is the same after a call that leaves no descriptor open, and closes
- * only its own. */
-int rig_free_fd(void);
-
 /* Records the stream. Returns the code of the call that failed, or of close. No descriptor is left open. */
 int rig_record(const char *path, struct recorder_options options, int keep, struct sh_err *err);
 

@@ -1,22 +1,26 @@
 /* SPDX-License-Identifier: MIT */
 #include "tests/unit/scene_files.h"
 
+#include "tests/common/free_fd.h"
+
 char folder[64];
 char path[128];
 char warnings[4096];
 int n_warnings;
+static int fd_before;
 
 int make_folder(void **state)
 {
     (void)state;
     strcpy(folder, "/tmp/scanhead-scene-XXXXXX");
+    fd_before = free_fd();
     return mkdtemp(folder) == NULL ? -1 : 0;
 }
 
 int remove_folder(void **state)
 {
     (void)state;
-    return rmdir(folder);
+    return rmdir(folder) != 0 ? -1 : free_fd_check(fd_before);
 }
 
 const char *path_in(const char *name)

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "firmware_sim/config/config.h"
+#include "tests/common/free_fd.h"
 #include "tests/unit/site_rig.h"
 
 enum { MAX_FILES = 8 };
@@ -9,7 +10,7 @@ struct config *cfg;
 struct sh_err err;
 
 static char dir[64], written[MAX_FILES][128];
-static int n_written;
+static int n_written, fd_before;
 
 static void keep_warning(void *ctx, const char *text)
 {
@@ -42,6 +43,7 @@ int site_rig_setup(void **state)
 {
     (void)state;
     char path[512];
+    fd_before = free_fd();
     strcpy(dir, "/tmp/scanhead_site_XXXXXX");
     if (mkdtemp(dir) == NULL || getcwd(path, sizeof path - 16) == NULL) return -1;
     strcat(path, "/config/heads");
@@ -56,5 +58,5 @@ int site_rig_teardown(void **state)
     while (n_written > 0)
         remove(written[--n_written]);
     free(cfg);
-    return rmdir(dir);
+    return rmdir(dir) != 0 ? -1 : free_fd_check(fd_before);
 }

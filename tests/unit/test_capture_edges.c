@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include "drivers/protocol/pcapng.h"
+#include "tests/common/free_fd.h"
 #include "tests/unit/talk_rig.h"
 
 static struct made m;
@@ -173,6 +174,29 @@ static void test_long_front(void **state)
     unlink(path);
 }
 
+/* No file stays open, whether it is a capture, is none, or is damaged. */
+static void test_files_are_closed(void **state)
+{
+    (void)state;
+    static const uint8_t junk[64] = {0x0a, 0x0d, 0x0d, 0x0a};
+    const int before = free_fd();
+    for (int kind = 0; kind < 3; kind++) {
+        struct replay_capture *capture = NULL;
+        struct sh_err err = {0};
+        made_begin(&m);
+        made_connect(&m, 3);
+        made_say(&m, 5, 1, "hello\n");
+        if (kind == 1) memcpy(m.bytes, junk, sizeof junk);
+        const char *path = made_write(&m, kind == 2 ? 0 : m.len);
+        assert_int_equal(capture_is(path), kind == 0);
+        assert_int_equal(free_fd(), before);
+        assert_int_equal(capture_load(path, NULL, &capture, &err) == SH_OK, kind == 0);
+        assert_int_equal(free_fd(), before);
+        capture_free(capture);
+        unlink(path);
+    }
+}
+
 /* Packets of a link type that is not read are left out; where nothing else is there, the file is refused. */
 static void test_unknown_link(void **state)
 {
@@ -328,6 +352,7 @@ int main(void)
         cmocka_unit_test(test_swapped_beginning),
         cmocka_unit_test(test_scans_stop),
         cmocka_unit_test(test_long_front),
+        cmocka_unit_test(test_files_are_closed),
         cmocka_unit_test(test_unknown_link),
         cmocka_unit_test(test_stopped),
     };

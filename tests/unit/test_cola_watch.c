@@ -215,14 +215,44 @@ static void a_polygon_has_a_record(void **state)
                 "32A FFFF 586 0 0 0 1 0 0");
 }
 
+/* A record may have 64 points. Point k is at beam 3 k, and ends k mm before 2 m. */
+static void a_record_has_64_points_at_most(void **state)
+{
+    (void)state;
+    for (int n = 63; n <= 65; n++) {
+        char record[1200], request[1300], answer[1300];
+        int at = snprintf(record, sizeof record, "3F800000 00000000 D05 FFF92230 2 1 1 %X", (unsigned)n);
+        for (int k = 0; k < n; k++)
+            at +=
+                snprintf(record + at, sizeof record - (size_t)at, " %X FFFF %X", 3U * (unsigned)k, 2000U - (unsigned)k);
+        snprintf(record + at, sizeof record - (size_t)at, " 0 0 0 1 0 0");
+        snprintf(request, sizeof request, "sWN field000 %s", record);
+        snprintf(answer, sizeof answer, "sRA field000 %s", record);
+        cola_open_tim("TiM781");
+        fields_open(NULL);
+        cola_authorise();
+        cola_expect(request, n <= 64 ? "sWA field000" : "sFA 5");
+        if (n > 64) continue;
+        cola_expect("sRN field000", answer);
+        fields_object(3 * (n - 1), 1, 1.9); /* at the last point, which reaches to 1.937 m */
+        fields_turn();
+        fields_expect("200");
+    }
+}
+
 int main(void)
 {
 #define CASE(f) cmocka_unit_test_teardown(f, cola_teardown)
     const struct CMUnitTest tests[] = {
-        CASE(inputs_choose_the_set),     CASE(a_soiled_window_shows),
-        CASE(an_object_must_stay),       CASE(a_field_ends_at_a_kilometre),
-        CASE(small_objects_are_blanked), CASE(an_lms_looks_at_the_echo_that_is_chosen),
-        CASE(a_rectangle_has_a_record),  CASE(a_polygon_has_a_record),
+        CASE(inputs_choose_the_set),
+        CASE(a_soiled_window_shows),
+        CASE(an_object_must_stay),
+        CASE(a_field_ends_at_a_kilometre),
+        CASE(small_objects_are_blanked),
+        CASE(an_lms_looks_at_the_echo_that_is_chosen),
+        CASE(a_rectangle_has_a_record),
+        CASE(a_polygon_has_a_record),
+        CASE(a_record_has_64_points_at_most),
     };
     return cmocka_run_group_tests_name("cola watch", tests, NULL, NULL);
 }

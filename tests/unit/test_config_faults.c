@@ -2,9 +2,8 @@
 /* All errors of a configuration at once, in their order, without those that only follow from another one. And files
  * that are no configuration. */
 #include "firmware_sim/config/load.h"
+#include "tests/common/free_fd.h"
 #include "tests/unit/config_rig.h"
-
-#include <fcntl.h>
 
 /* The errors are these, in this order. Each begins with PATH:LINE: KEY, or with the text here. */
 static void assert_faults(const char *const *starts, uint32_t n)
@@ -155,21 +154,12 @@ static void a_file_that_cannot_be_read_is_refused(void **state)
     assert_string_equal(err.text, "/proc/self/mem: cannot be read: Input/output error; a YAML file is needed");
 }
 
-/* Returns the lowest free descriptor. */
-static int lowest_free(void)
-{
-    const int fd = open("/dev/null", O_RDONLY);
-    assert_true(fd >= 0);
-    close(fd);
-    return fd;
-}
-
 static void no_file_stays_open(void **state)
 {
     (void)state;
     struct fault fault;
     struct config_profile profile;
-    const int before = lowest_free();
+    const int before = free_fd();
     write_in("test.yaml", "faults: [{kind: drop}]\n");
     assert_int_equal(config_load(config_path, NULL, 0, cfg, &err), SH_EINPUT);
     assert_int_equal(config_add_scenario(cfg, config_path, &diagnostics), SH_OK);
@@ -181,7 +171,7 @@ static void no_file_stays_open(void **state)
     assert_int_equal(load_edited("cube.obj", "dir.obj"), SH_EINPUT);
     assert_int_equal(load_changed("leica-rtc360", "max_echoes: { value: 1,", "max_echoes: { value: x,"), SH_EINPUT);
     assert_int_equal(config_load_profile("any-rate", NULL, &profile, &err), SH_OK);
-    assert_int_equal(lowest_free(), before);
+    assert_int_equal(free_fd(), before);
 }
 
 int main(void)

@@ -209,6 +209,27 @@ static void a_beam_beside_the_scene(void **state)
     close_scene();
 }
 
+/* The beam goes along x = y and passes 5 cm beside the wall's edge, whichever of its edges that is. The point is nearest
+ * to the wall's inside, and as far from it as a deviation along the beam would explain. */
+static void a_slanted_beam_beside_an_edge(void **state)
+{
+    (void)state;
+    static const char *const face[] = {"f 1 2 3\n", "f 2 3 1\n", "f 3 1 2\n", "f 3 2 1\n", "f 1 3 2\n", "f 2 1 3\n"};
+    for (size_t i = 0; i < sizeof face / sizeof face[0]; i++)
+        for (int hits = 0; hits < 2; hits++) {
+            char text[128];
+            snprintf(text, sizeof text, "v %s 10 -50\nv %s 10 50\nv 60 10 0\n%s", hits ? "9.95" : "10.05",
+                     hits ? "9.95" : "10.05", face[i]);
+            open_scene(text);
+            add(10.1, 10.1, 0);
+            compare();
+            assert_true(fabs(distance_m[0] - 0.1) < 1e-9);
+            follow();
+            if (isnan(out.along_m[0]) == hits) fail_msg("%s", text);
+            close_scene();
+        }
+}
+
 /* Stations take turns, each by one or more points; one of them is 4 m to the right. Every point has its own deviation,
  * also the only one of a cloud, and the last of many. */
 static void stations_and_numbers(void **state)
@@ -360,6 +381,7 @@ int main(void)
         cmocka_unit_test(distances_that_fit),
         cmocka_unit_test(points_without_a_deviation),
         cmocka_unit_test(a_beam_beside_the_scene),
+        cmocka_unit_test(a_slanted_beam_beside_an_edge),
         cmocka_unit_test(stations_and_numbers),
         cmocka_unit_test(surfaces_that_are_near),
         cmocka_unit_test(a_stop_is_heard),

@@ -124,7 +124,8 @@ static void test_many_zeros(void **state)
         unlink(file.path);
         repair_free(&file);
     }
-    assert_true(n[1] > n[0]);
+    assert_in_range(n[0], 1, 1 + 3);               /* once for the file, once for each scan */
+    assert_in_range(n[1] - n[0], 1, PAGES / 1000); /* rarely enough that questions take no time */
 }
 
 static int tear_down(void **state)

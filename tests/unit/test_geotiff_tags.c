@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "core/geotiff.h"
+#include "tests/common/free_fd.h"
 #include "tests/unit/scene_files.h"
 
 enum { ASCII = 2, SHORT = 3, LONG = 4, DOUBLE = 12, LONG8 = 16, MOST = 12 };
@@ -41,14 +42,6 @@ static uint64_t value_of(const struct tag *t, size_t i)
     return v;
 }
 
-static int lowest_free_fd(void)
-{
-    const int fd = dup(STDERR_FILENO);
-    assert_true(fd >= 0);
-    close(fd);
-    return fd;
-}
-
 /* Head, directory, then the values that don't fit into their entries. No descriptor stays open. */
 static int read_made(const struct made *m)
 {
@@ -75,8 +68,8 @@ static int read_made(const struct made *m)
     memset(&g, 0x55, sizeof g);
     memset(&err, 0, sizeof err);
     write_file("tags.tif", file, end);
-    const int free_fd = lowest_free_fd(), rc = geotiff_read(path, &g, &err);
-    assert_int_equal(lowest_free_fd(), free_fd);
+    const int before = free_fd(), rc = geotiff_read(path, &g, &err);
+    assert_int_equal(free_fd(), before);
     unlink(path);
     return rc;
 }

@@ -115,6 +115,10 @@ static void test_cannot_open(void **state)
     assert_int_equal(scanhead_open("usb:1209:1", &sh, err, sizeof err), SCANHEAD_ELOST);
     assert_string_equal(err, "usb:1209:1: no such head on USB; scanhead list shows the heads");
     bus.device[0].present = 1;
+    /* The head is 1209:0001. 0 is a number like any other, and the only number that fits is the head's. */
+    static const char *const others[] = {"usb:0:1", "usb:1209:0", "usb:0:0", "usb:120a:1", "usb:1209:2"};
+    for (size_t i = 0; i < sizeof others / sizeof others[0]; i++)
+        assert_int_equal(scanhead_open(others[i], &sh, err, sizeof err), SCANHEAD_ELOST);
     bus.device[0].open_rc = LIBUSB_ERROR_NO_MEM;
     assert_int_equal(scanhead_open("usb", &sh, err, sizeof err), SCANHEAD_EIO);
     assert_memory_equal(err, "usb: cannot open the head 1209:0001, bus 1 device 2: ", 53);

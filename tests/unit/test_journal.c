@@ -14,13 +14,16 @@
 #include <cmocka.h>
 
 #include "firmware_sim/device/journal.h"
+#include "tests/common/free_fd.h"
 
 static char dir[] = "/tmp/scanhead-journal-XXXXXX";
 static char path[64];
+static int fd_before;
 
 static int make_dir(void **ctx)
 {
     (void)ctx;
+    fd_before = free_fd();
     if (mkdtemp(dir) == NULL) return -1;
     snprintf(path, sizeof path, "%s/j.txt", dir);
     return 0;
@@ -30,7 +33,7 @@ static int remove_dir(void **ctx)
 {
     (void)ctx;
     unlink(path);
-    return rmdir(dir);
+    return rmdir(dir) != 0 ? -1 : free_fd_check(fd_before);
 }
 
 static void write_text(const char *text, size_t len)

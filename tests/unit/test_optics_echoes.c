@@ -107,6 +107,42 @@ static void echoes_have_their_own_noise(void **state)
     close_optics(&o);
 }
 
+/* With noise of 3 m some echoes of the pane and of the wall get ranges of 0 or less. These are lost, and each of them is
+ * counted once. The others are sent. */
+static void echoes_that_noise_moves_behind_the_head_are_lost(void **state)
+{
+    (void)state;
+    enum { N = 100 };
+    static const double y[] = {2.0, 2.004, 5.0};
+    struct optics o;
+    struct schedule_line line;
+    struct cast_counters counters;
+    uint32_t sent = 0, lost_later = 0;
+    open_optics(&o, window());
+    o.table.surface[0] = (struct surface){.reflectance = 0.05, .glass = 0.9};
+    o.table.has_optics = 1;
+    o.rig->setup.noise_on = 1;
+    o.rig->setup.range_sigma_m = 3.0;
+    o.rig->setup.noise_key = rng_key(7, RNG_RANGE);
+    o.rig->setup.scan_key = rng_scan(0, 3);
+    schedule_get_line(&o.rig->segment, 0, &line);
+    for (uint32_t i = 0; i < 3 * N; i++) {
+        const uint32_t pulse = 10 + i / 3;
+        const uint64_t key = rng_echo(line.cast0 + pulse, i % 3);
+        long double d[3];
+        direction(o.rig, &line, pulse, d);
+        double range_m = (double)(((long double)y[i % 3] - (long double)STATION[1]) / d[1]);
+        detect_fixed_noise(3.0, 0.0, o.rig->setup.noise_key ^ o.rig->setup.scan_key, 1, &key, &range_m);
+        sent += range_m > 0.5 * o.rig->setup.range_scale_m;
+        lost_later += i % 3 > 0 && range_m < 0.0;
+    }
+    assert_in_range(lost_later, 10, 2 * N - 10);
+    assert_int_equal(cast_some(o.rig, &line, line.cast0 + 10, N), sent);
+    caster_get_counters(o.rig->caster, &counters);
+    assert_int_equal(counters.faint, 3 * N - sent);
+    close_optics(&o);
+}
+
 /* An echo that does not fit into 31 bits of counts is dropped and counted. In this test the wall does not fit, while
  * the pane's two sides do and are numbered as two. If no echo fits, one entry stays, without echo. */
 static void echoes_that_do_not_fit(void **state)
@@ -260,10 +296,15 @@ static void zones_follow_the_pulse_rate(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(glass_in_a_mirror),           cmocka_unit_test(one_of_a_pulse_s_echoes),
-        cmocka_unit_test(echoes_that_do_not_fit),      cmocka_unit_test(echoes_of_a_moving_head),
-        cmocka_unit_test(which_side_of_a_body_is_met), cmocka_unit_test(what_is_too_faint_is_not_met),
-        cmocka_unit_test(echoes_have_their_own_noise), cmocka_unit_test(zones_follow_the_pulse_rate),
+        cmocka_unit_test(glass_in_a_mirror),
+        cmocka_unit_test(one_of_a_pulse_s_echoes),
+        cmocka_unit_test(echoes_that_do_not_fit),
+        cmocka_unit_test(echoes_of_a_moving_head),
+        cmocka_unit_test(which_side_of_a_body_is_met),
+        cmocka_unit_test(what_is_too_faint_is_not_met),
+        cmocka_unit_test(echoes_have_their_own_noise),
+        cmocka_unit_test(zones_follow_the_pulse_rate),
+        cmocka_unit_test(echoes_that_noise_moves_behind_the_head_are_lost),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

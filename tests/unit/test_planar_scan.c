@@ -264,6 +264,9 @@ static void what_is_no_loss(void **state)
     part(4, 0, 3);
     protocol_rig_turn_end(&rig, 4, LINE_PARTIAL); /* the scan was stopped within it */
     expect(1, 0, 0);
+    rig.scan_t0_ns += 60000000000; /* another scan, whose descriptor is missing */
+    turn(0);
+    expect(1, 1, 0);
     open_head(-1, 0);
     protocol_rig_turn_end(&rig, 8, 0);
     turn(9);

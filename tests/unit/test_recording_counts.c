@@ -242,6 +242,31 @@ static void test_unknown(void **state)
     }
 }
 
+/* Another head, or the same one after a start, has a scan of the same number. What was said of the earlier scan is not
+ * said of it. Heads count their scans from 1. */
+static void test_what_was_said_of_an_earlier_scan(void **state)
+{
+    (void)state;
+    for (uint32_t number = 1; number <= 3; number += 2) {
+        struct recording_counts c;
+        begin(&c, number);
+        telemetry(&c, HEAD_SPIN_DOWN, number, 200, 160, 10);
+        event(&c, SCANHEAD_EV_SCAN_END, number, 200, 10);
+        expect_whole(&c);
+        event(&c, SCANHEAD_EV_SCAN_START, number, 0, 0);
+        points(&c, 1);
+        event(&c, SCANHEAD_EV_SCAN_END, number, 2, 0);
+        assert_true(c.scans == 2 && c.pulses == 101 && c.fired == 202 && c.cast == 161 && c.lost == 10);
+        assert_true(c.missing == 50 && c.unknown == 1);
+        /* The counts of a scan that is due are not those of a scan of that number that began after it. */
+        begin(&c, number);
+        event(&c, SCANHEAD_EV_SCAN_END, number, 200, 10);
+        event(&c, SCANHEAD_EV_SCAN_START, number, 0, 0);
+        telemetry(&c, HEAD_SPIN_DOWN, number, 7, 6, 0);
+        assert_true(c.scans == 1 && c.fired == 200 && c.cast == 120 && c.unknown == 1);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {cmocka_unit_test_setup(test_left_out, set_up),
@@ -250,6 +275,7 @@ int main(void)
                                        cmocka_unit_test_setup(test_counts_without_an_end, set_up),
                                        cmocka_unit_test_setup(test_final_counts, set_up),
                                        cmocka_unit_test_setup(test_final_counts_without_an_end, set_up),
-                                       cmocka_unit_test_setup(test_unknown, set_up)};
+                                       cmocka_unit_test_setup(test_unknown, set_up),
+                                       cmocka_unit_test_setup(test_what_was_said_of_an_earlier_scan, set_up)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* These tests repair in process. A small file of each format is cut at every byte, damaged at every third, replaced by
  * another format, and given absurd numbers. The result holds the whole units and is whole, or nothing has changed. */
+#include "tests/common/free_fd.h"
 #include "tests/common/thorough.h"
 #include "tests/unit/repair_rig.h"
 
@@ -11,9 +12,9 @@ enum { EACH = SANITIZED ? 101 : 1 }; /* of the bytes */
 static int repair(const void *data, size_t len, struct repaired *file, struct bytes *got)
 {
     repair_write_file(repair_part, data, len);
-    const int free_fd = rig_free_fd();
+    const int before = free_fd();
     const int rc = repair_file(repair_path, NULL, file, &repair_err);
-    assert_int_equal(rig_free_fd(), free_fd);
+    assert_int_equal(free_fd(), before);
     *got = repair_slurp(rc == 0 ? repair_path : repair_part);
     if (rc != 0) {
         assert_int_equal(rc, SH_EFORMAT);

@@ -78,6 +78,33 @@ static void a_power_cycle_begins_anew(void **state)
     rig_close(rig);
 }
 
+/* Scans from before a power cycle are still sent after it. Their dates are those of the clock that they were made with:
+ * that of the period before, whichever it is, and with UTC where the clock had it. */
+static void dates_from_before_a_power_cycle(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *sets[2];
+        int64_t zero_ns;
+    } cases[] = {{{"time.epoch=none", "ntp.role=none"}, 0},
+                 {{"time.epoch=2026-01-01T00:00:00Z", "ntp.role=none"}, EPOCH_NS}};
+    for (size_t i = 0; i < 2; i++) {
+        const int by_utc = cases[i].zero_ns != 0;
+        struct rig *rig = rig_open(NULL, cases[i].sets, 2);
+        for (int64_t cycle = 0, on_ms = 0; cycle < 3; cycle++) {
+            rig_go_to(rig, (uint64_t)on_ms + 300);
+            const int64_t t_ns = (on_ms + 300) * MS, date_ns = by_utc ? EPOCH_NS + t_ns : 300 * MS;
+            assert_true(device_date_ns(rig->device, t_ns) == date_ns);
+            expect(rig, "HEAD:REB", "OK");
+            on_ms = (int64_t)rig->next + 1; /* power comes with the next tick */
+            rig_go_to(rig, (uint64_t)on_ms + 10);
+            assert_true(device_date_ns(rig->device, (on_ms + 5) * MS) == (by_utc ? EPOCH_NS + on_ms * MS : 0) + 5 * MS);
+            assert_true(device_date_ns(rig->device, t_ns) == date_ns);
+        }
+        rig_close(rig);
+    }
+}
+
 /* Whether a server is to be asked: by role, interface, state of the head, and address. */
 static void who_is_asked(void **state)
 {
@@ -185,6 +212,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(it_begins_with_power),
         cmocka_unit_test(a_power_cycle_begins_anew),
+        cmocka_unit_test(dates_from_before_a_power_cycle),
         cmocka_unit_test(who_is_asked),
         cmocka_unit_test(the_server_is_stored),
         cmocka_unit_test(a_journal_has_the_dates),

@@ -14,9 +14,11 @@
 #include <cmocka.h>
 
 #include "firmware_sim/device/settings_file.h"
+#include "tests/common/free_fd.h"
 
 static char dir[] = "/tmp/test_settings_XXXXXX", path[64], part[64], inner[64];
 static struct sh_err err;
+static int fd_before;
 
 static void write_text(const char *text)
 {
@@ -360,6 +362,7 @@ static void links_and_folders_are_refused(void **state)
 static int make_dir(void **state)
 {
     (void)state;
+    fd_before = free_fd();
     if (mkdtemp(dir) == NULL) return -1;
     snprintf(path, sizeof path, "%s/set", dir);
     snprintf(part, sizeof part, "%s/set.part", dir);
@@ -372,7 +375,7 @@ static int remove_dir(void **state)
     (void)state;
     unlink(path);
     unlink(part);
-    return rmdir(dir);
+    return rmdir(dir) != 0 ? -1 : free_fd_check(fd_before);
 }
 
 int main(void)

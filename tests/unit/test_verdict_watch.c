@@ -92,6 +92,25 @@ static void test_whom_a_fault_concerns(void **state)
     assert_int_equal(w.injected, 2);
 }
 
+/* A power cycle concerns each link that is watched, and no other. */
+static void test_all_links(void **state)
+{
+    (void)state;
+    note(FAULT_POWER_CYCLE, 0, 100.0);
+    assert_true(w.link[0].acted && w.link[1].acted && !w.link[2].acted);
+    watch_free(&w);
+    watch_begin(&w, CONFIG_MAX_LINKS, 1, 60.0);
+    for (uint32_t i = 0; i < CONFIG_MAX_LINKS; i++)
+        session(1 + 8 * i, 1);
+    note(FAULT_POWER_CYCLE, 0, 100.0);
+    assert_int_equal(w.n_broken, 0);
+    for (uint32_t i = 0; i < CONFIG_MAX_LINKS; i++)
+        session(1 + 8 * i, 0);
+    assert_int_equal(w.n_broken, CONFIG_MAX_LINKS);
+    for (uint32_t i = 0; i < CONFIG_MAX_LINKS; i++)
+        assert_int_equal(w.broken[i].link, i + 1);
+}
+
 /* A client may end a connection that is silent, and then has to come back. A client that keeps it need not. */
 static void test_silence(void **state)
 {
@@ -196,6 +215,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_a_session_that_a_fault_ends, begin, end),
         cmocka_unit_test_setup_teardown(test_a_client_that_goes_by_itself, begin, end),
         cmocka_unit_test_setup_teardown(test_whom_a_fault_concerns, begin, end),
+        cmocka_unit_test_setup_teardown(test_all_links, begin, end),
         cmocka_unit_test_setup_teardown(test_silence, begin, end),
         cmocka_unit_test_setup_teardown(test_an_end_long_after_a_silence, begin, end),
         cmocka_unit_test_setup_teardown(test_requests, begin, end),

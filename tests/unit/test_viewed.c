@@ -16,9 +16,11 @@
 #include "core/bytes.h"
 #include "firmware_sim/app/studio/view/encode.h"
 #include "firmware_sim/app/studio/view/serve.h"
+#include "tests/common/free_fd.h"
 
 static struct sh_err err;
 static char path[64];
+static int fd_before;
 
 /* Writes a PLY file of the test's own, as text. The file's name is good until the next one. */
 static const char *write_ply(const char *comments, const char *properties, int n, const char *rows)
@@ -314,6 +316,19 @@ static void places_beyond_any_are_left_out(void **state)
     }
 }
 
+static int note_free_fd(void **state)
+{
+    (void)state;
+    fd_before = free_fd();
+    return 0;
+}
+
+static int no_file_is_open(void **state)
+{
+    (void)state;
+    return free_fd_check(fd_before);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -325,5 +340,5 @@ int main(void)
         cmocka_unit_test(triangles_as_bytes),
         cmocka_unit_test(requests),
     };
-    return cmocka_run_group_tests(tests, NULL, NULL);
+    return cmocka_run_group_tests(tests, note_free_fd, no_file_is_open);
 }

@@ -112,6 +112,30 @@ static void test_pings(void **state)
     bench_close(&bench);
 }
 
+/* A message may have 4096 bytes, in one piece or in several. One byte more is refused (test_ends). */
+static void test_longest_message(void **state)
+{
+    (void)state;
+    enum { MOST = 4096 };
+    static const size_t first[] = {MOST, 1, MOST - 1, 2000};
+    char place[64], sent[MOST], text[MOST + 1];
+    struct bench bench = web_open(place);
+    int fd = web_upgrade(&bench, place, "/ws", "");
+    bench_expect(&bench, LINK_OPENED, 0);
+    for (size_t i = 0; i < MOST; i++)
+        sent[i] = (char)('a' + i % 26);
+    for (size_t i = 0; i < sizeof first / sizeof first[0]; i++) {
+        const int is_whole = first[i] == MOST;
+        web_send_frame(fd, is_whole ? 0x81 : 0x01, sent, first[i]);
+        if (!is_whole) web_send_frame(fd, 0x80, sent + first[i], MOST - first[i]);
+        bench_read_all(&bench, 0, text, MOST + 1);
+        assert_memory_equal(text, sent, MOST);
+        assert_int_equal(text[MOST], '\n');
+    }
+    close(fd);
+    bench_close(&bench);
+}
+
 /* A frame comes after the request, in the same piece. */
 static void test_early_frames(void **state)
 {
@@ -224,8 +248,13 @@ static void test_goodbye_without_cable(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_ends),       cmocka_unit_test(test_pings), cmocka_unit_test(test_early_frames),
-        cmocka_unit_test(test_last_words), cmocka_unit_test(test_crowd), cmocka_unit_test(test_goodbye_without_cable),
+        cmocka_unit_test(test_ends),
+        cmocka_unit_test(test_pings),
+        cmocka_unit_test(test_longest_message),
+        cmocka_unit_test(test_early_frames),
+        cmocka_unit_test(test_last_words),
+        cmocka_unit_test(test_crowd),
+        cmocka_unit_test(test_goodbye_without_cable),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
