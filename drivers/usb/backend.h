@@ -35,7 +35,7 @@ enum { USB_CAN_STALL = 1, USB_CAN_SHORTEN = 2, USB_CAN_ENUMERATE_WRONG = 4 };
 /* The owner of a back end, which handle() calls. */
 struct usb_owner {
     int (*go_on)(void *ctx);                       /* 0: the owner has to report something before the next act */
-    void (*say)(void *ctx, const char *text);      /* a line for the person who runs the head */
+    void (*say)(void *ctx, const char *text);      /* a line for its user; replaces an untold one */
     void (*refuse)(void *ctx, const char *client); /* it was turned away, for want of a descriptor */
     void *ctx;
 };

@@ -74,34 +74,32 @@ static int lock_gadget(const char *name)
     const int fd = open(dir, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (fd < 0 || flock(fd, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return fd;
     close(fd);
+    errno = EWOULDBLOCK;
     return -1;
 }
 
-static int is_locked(const char *name)
-{
-    const int fd = lock_gadget(name);
-    if (fd >= 0) close(fd);
-    return fd < 0;
-}
-
-/* Whether the process that made the gadget is gone: there is none of that number here, or a later one has got the
- * number, and none anywhere has the gadget locked. */
-static int is_left_behind(const char *name)
+/* Locks a gadget if the process that made it is gone: there is none of that number here, or a later one has got the
+ * number, and none anywhere has the gadget locked. Returns the descriptor; -1: the gadget is in use, or no head's. */
+static int lock_left_behind(const char *name)
 {
     long pid;
     unsigned long long start, now;
-    if (strncmp(name, PREFIX, sizeof PREFIX - 1) != 0) return 0;
-    if (sscanf(name + sizeof PREFIX - 1, "%ld-%llu-", &pid, &start) != 2 || pid <= 0) return 0;
+    if (strncmp(name, PREFIX, sizeof PREFIX - 1) != 0) return -1;
+    if (sscanf(name + sizeof PREFIX - 1, "%ld-%llu-", &pid, &start) != 2 || pid <= 0) return -1;
     const int is_other = started_at(pid, &now) == 0 ? now != start : errno == ENOENT || errno == ESRCH;
-    return is_other && !is_locked(name);
+    return is_other ? lock_gadget(name) : -1;
 }
 
 static void remove_left_behind(void)
 {
     DIR *dir = opendir(GADGETS);
     if (dir == NULL) return;
-    for (struct dirent *entry; (entry = readdir(dir)) != NULL;)
-        if (is_left_behind(entry->d_name)) remove_all(entry->d_name);
+    for (struct dirent *entry; (entry = readdir(dir)) != NULL;) {
+        const int fd = lock_left_behind(entry->d_name);
+        if (fd < 0) continue;
+        remove_all(entry->d_name);
+        close(fd);
+    }
     closedir(dir);
 }
 
@@ -169,6 +167,22 @@ static int look_for_configfs(struct sh_err *err)
     return SH_OK;
 }
 
+/* Makes the gadget's directory and locks it. Until it is locked, a head of another container may take it for one that
+ * was left behind, and remove it: then the next number may do. Returns 0; -1: errno has the reason, EEXIST in this
+ * case. */
+static int make_locked_dir(struct gadget *gadget)
+{
+    if (mkdir(gadget->dir, 0755) != 0) return -1;
+    gadget->lock_fd = lock_gadget(gadget->name);
+    if (gadget->lock_fd >= 0 && access(gadget->dir, F_OK) == 0) return 0;
+    const int error = gadget->lock_fd >= 0 || errno == EWOULDBLOCK || errno == ENOENT ? EEXIST : errno;
+    if (gadget->lock_fd >= 0) close(gadget->lock_fd);
+    gadget->lock_fd = -1;
+    rmdir(gadget->dir);
+    errno = error;
+    return -1;
+}
+
 static int make_named_dir(struct gadget *gadget, struct sh_err *err)
 {
     const long pid = (long)getpid();
@@ -178,10 +192,7 @@ static int make_named_dir(struct gadget *gadget, struct sh_err *err)
     for (int i = 0; i < 100; i++) {
         snprintf(gadget->name, sizeof gadget->name, "%s%ld-%llu-%d", PREFIX, pid, start, i);
         snprintf(gadget->dir, sizeof gadget->dir, "%s/%s", GADGETS, gadget->name);
-        if (mkdir(gadget->dir, 0755) == 0) {
-            gadget->lock_fd = lock_gadget(gadget->name);
-            return SH_OK;
-        }
+        if (make_locked_dir(gadget) == 0) return SH_OK;
         if (errno != EEXIST) break;
     }
     int error = errno;

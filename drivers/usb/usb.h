@@ -17,11 +17,12 @@
  *
  * IN packets: a transfer ends when it is full, or with a short packet. The data of one usb_device_write() end with a
  * short packet, or with a zero-length packet where they are a whole number of packets. Where they filled the transfer
- * exactly, the zero-length packet ends the next transfer that is submitted, unless more is written first. A transfer
- * that waits already stays: an end that carries nothing costs a reader of a stream a turn. On an endpoint that has `units`
- * (model.h: the data of one write are a unit) that packet always comes before further data: at once if another transfer
- * waits, else with the next one that is submitted. A transfer whose rest is smaller than the next packet fails with
- * USB_OVERFLOW, as on a real bus. The packet that did not fit stays with the function: nothing is lost.
+ * exactly, the zero-length packet ends the next transfer that is submitted while no other waits, unless more is
+ * written first. A transfer that waits already stays: an end that carries nothing costs a reader of a stream a turn. On
+ * an endpoint that has `units` (model.h: the data of one write are a unit) that packet always comes before further
+ * data: at once if another transfer waits, else with the next one that is submitted. A transfer whose rest is smaller
+ * than the next packet fails with USB_OVERFLOW, as on a real bus. The packet that did not fit stays with the function:
+ * nothing is lost.
  *
  * Wire formats: Universal Serial Bus 2.0, chapter 9; USB 3.2, chapter 9 (super speed, BOS); CDC 1.2 and PSTN
  * 1.2; Microsoft OS 2.0 Descriptors Specification. Numbers in structs are in host order unless said.

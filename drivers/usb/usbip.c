@@ -181,14 +181,15 @@ static void usbip_flush(void *backend)
 }
 
 /* Whether the host that has the device has hung up. What it sent before is read within the next turns, and the device
- * is free then. A full connection is no such case, since it is not read until its host takes replies. */
+ * is free then. A full connection is not read until its host takes replies, so it counts only where it is broken. */
 static int is_host_leaving(const struct usbip *self)
 {
     for (int i = 0; i < MAX_CONNS; i++) {
         const struct usbip_conn *conn = &self->conn[i];
         struct pollfd slot = {.fd = conn->fd, .events = POLLRDHUP};
         if (conn->fd < 0 || !conn->imported) continue;
-        return conn->broken || (!usbip_conn_is_full(conn) && poll(&slot, 1, 0) > 0);
+        return conn->broken ||
+               (poll(&slot, 1, 0) > 0 && (!usbip_conn_is_full(conn) || (slot.revents & (POLLHUP | POLLERR)) != 0));
     }
     return 0;
 }

@@ -11,6 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/ioctl.h>
+#include <sys/file.h>
 #include <sys/mount.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
@@ -86,6 +87,15 @@ static void add_parts(const char *path)
     }
 }
 
+static int other_head = -1; /* the gadget's directory that it has locked */
+
+static void lock_as_other(const char *real)
+{
+    if (other_head >= 0) close(other_head);
+    other_head = configfs.locks_first-- > 0 ? (int)syscall(SYS_openat, AT_FDCWD, real, O_RDONLY | O_DIRECTORY) : -1;
+    if (other_head >= 0) assert_int_equal(flock(other_head, LOCK_EX), 0);
+}
+
 int mkdir(const char *path, mode_t mode)
 {
     char to[PATH_ROOM], kind[16];
@@ -101,6 +111,7 @@ int mkdir(const char *path, mode_t mode)
     if (strstr(path, kind) != NULL) return errno = ENOENT, -1;
     if (syscall(SYS_mkdirat, AT_FDCWD, real, mode) != 0) return -1;
     add_parts(path);
+    if (strchr(name, '/') == NULL) lock_as_other(real);
     return 0;
 }
 
@@ -337,6 +348,8 @@ int configfs_tear_down(void **state)
     char dir[sizeof root];
     memcpy(dir, root, sizeof dir);
     root[0] = '\0';
+    if (other_head >= 0) close(other_head);
+    other_head = -1;
     const int rc = nftw(dir, remove_one, 8, FTW_DEPTH | FTW_PHYS);
     if (count_open() != n_open) fail_msg("%d descriptors were open before, now %d", n_open, count_open());
     return rc;

@@ -22,6 +22,7 @@ extern struct configfs {
     const char *fails;       /* an attribute that can't be written: EIO */
     int mkdir_error;         /* errno for each new gadget */
     int taken;               /* names that exist already: so many new gadgets fail */
+    int locks_first;         /* so many new gadgets are locked by another head before their own does */
     int mount_error;         /* errno for FunctionFS */
     const char *mounts;      /* /proc/self/mounts */
     int write_that_fails;    /* the n-th from now: ENOSPC */

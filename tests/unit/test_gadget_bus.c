@@ -293,11 +293,29 @@ static void test_another_container(void **state)
     }
 }
 
+/* Another head may lock the new directory first, and remove it. A gadget without its lock is not used. */
+static void test_no_lock(void **state)
+{
+    (void)state;
+    const struct usb_identity id = {.vid = 1, .pid = 2, .highest = USB_RATE_HIGH};
+    configfs.locks_first = 1;
+    make();
+    assert_non_null(strstr(gadget.name, "-1")); /* the next number */
+    assert_int_equal(lock(gadget.dir), -1);
+    gadget_remove(&gadget);
+    configfs.locks_first = 1000; /* more than there are numbers to try */
+    assert_int_equal(gadget_create(&gadget, &pair_model, &id, &err), SH_EIO);
+    assert_non_null(strstr(err.text, "functionfs: no gadget in"));
+    configfs.locks_first = 0;
+    assert_int_equal(configfs_count(), 0);
+}
+
 int main(void)
 {
 #define TEST(name) cmocka_unit_test_setup_teardown(name, configfs_set_up, configfs_tear_down)
     const struct CMUnitTest tests[] = {TEST(test_plugging),
                                        TEST(test_another_container),
+                                       TEST(test_no_lock),
                                        TEST(test_states),
                                        TEST(test_rates),
                                        TEST(test_description),
