@@ -286,7 +286,7 @@ static void test_long_path(void **state)
     const char *const check[] = {"check", config, NULL};
     assert_int_equal(wire_wait(wire, wire_spawn(wire, check, "check.txt", "head.err", -1)), 0);
     char *text = wire_read(wire_path(wire, "check.txt"), NULL);
-    assert_non_null(strstr(text, "; 3 BVH")); /* of 2 km each */
+    assert_non_null(strstr(text, "; 3 stretches")); /* of 2 km each */
     free(text);
     /* The gate is left out, as `scanhead report` does not know it. The wall is 12 m away, and up to 30 m up; the bound
      * is the encoders'. */
