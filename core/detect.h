@@ -68,7 +68,6 @@ struct detect_signal {
     uint32_t n;
     double g0, at_m[DETECT_MAX_REACHES], more_1_m[DETECT_MAX_REACHES];
     double per_overlap2, extinction2_1_m;
-    double steepest_1_m;    /* a bound of the change of g and of the air with range */
     double per_snr;         /* 1/k; 0: sharp */
     double floor2, jitter2; /* parts of sigma^2: the constant one, and the other one at A = 1 */
     double per_distance;
@@ -82,12 +81,6 @@ int detect_signal_set_up(const struct detect_signal_spec *spec, struct detect_si
 
 /* Returns the amplitude A of the light that comes back from range_m. rho: the product E rho(i). */
 double detect_amplitude(const struct detect_signal *signal, double range_m, double rho);
-/* Sets these amplitudes for rho = 1. */
-void detect_unit_amplitudes(const struct detect_signal *signal, uint32_t n, const double *range_m, double *amplitude);
-/* Returns a bound of the change of log A with range, per metre, at range_m and beyond. */
-double detect_steepness(const struct detect_signal *signal, double range_m);
-/* Returns the change of log A with range, per metre. */
-double detect_slope(const struct detect_signal *signal, double range_m);
 
 /* Returns the reflectance that a head reports for an amplitude at range_m, in the data sheet's air. */
 double detect_reflectance(const struct detect_signal *signal, double range_m, double amplitude);

@@ -25,13 +25,8 @@
  * surface is the one that sends most of it back. Returns of less than 1 % of the footprint's energy make no echo. Where
  * there are more echoes than the head can report, the weakest are left out, and counted. Where surfaces are
  * modelled (core/surface.h), the weight of a return is the power that comes back: energy times the surface's
- * return, times the share that glass and mirrors before it let through. Where a signal is modelled as well, the weight
- * is the power received: distance, overlap and air count, too (the amplitude A of core/detect.h). An echo's power is
- * then the sum of these, and the weakest echo is that of the least power. Where this moves an echo's range by less than
- * BEAM_LEAST_SHIFT_M, as on nearly all surfaces, it is left out. Where the rest beyond the first order is less than
- * that, the range alone is moved, by the variance of the returns' ranges times the change of log A with range. Without
- * a signal, distance has no part in the weights. The 1 % is still of the footprint's energy. Where no return sends
- * anything back, energy is the weight.
+ * return, times the share that glass and mirrors before it let through. The 1 % is still of the footprint's
+ * energy. Where no return sends anything back, energy is the weight.
  *
  * Width. An echo's width adds two widths as squares: that of the pulse, resolution_m, and 2.355 sigma of its
  * ranges (full widths at half maximum of Gaussians). A return may stand for a part of the footprint, or for
@@ -50,7 +45,6 @@
 
 #include <stdint.h>
 
-#include "core/detect.h"
 #include "core/err.h"
 #include "core/line.h"
 #include "core/scene.h"
@@ -76,9 +70,8 @@ enum {
     BEAM_SUBRAY_ROOM = (BEAM_MAX_SUBRAYS + 63) / 64 * 64,
     BEAM_HALF_STEPS = 1024,
 };
-#define BEAM_LEAST_ENERGY  0.01 /* of the footprint's, for an echo */
-#define BEAM_LEAST_STEP_M  5e-4 /* no outline where both sides are nearer to each other */
-#define BEAM_LEAST_SHIFT_M 1e-4 /* of an echo's range, by distance, overlap and air; less is left out */
+#define BEAM_LEAST_ENERGY 0.01 /* of the footprint's, for an echo */
+#define BEAM_LEAST_STEP_M 5e-4 /* no outline where both sides are nearer to each other */
 
 /* A beam's figures. Constant after beam_init; any thread. */
 struct beam {
@@ -139,13 +132,11 @@ struct beam_return {
     float sigma_m; /* of the ranges within it */
     uint32_t label;
     uint32_t colour; /* goes along with the label */
-    float gain;      /* set by beam_gains; read only after that */
 };
 
 struct beam_echo {
     double range_m;
-    /* Sums over its returns. With a signal, detect_amplitude of range_m and back is the power received. */
-    double energy, back;
+    double energy, back; /* sums over its returns */
     float width_m;
     uint32_t label, colour;
     uint8_t number; /* among the pulse's echoes, from 0, left-out ones included; keys random numbers */
@@ -158,16 +149,9 @@ struct beam_merging {
     double least_energy; /* less is no echo */
     int by_surface;      /* 1: an echo's surface is the one that returns most; 0: that of its strongest return */
     uint32_t most;       /* echoes of a pulse; the weakest are left out */
-    const struct detect_signal *signal; /* for weights by received power; NULL: distance has no part in them */
 };
-/* Sets how the returns of a footprint are merged, as defined above, without a signal. */
+/* Sets how the returns of a footprint are merged, as defined above. */
 void beam_merging(const struct beam *beam, uint32_t most, struct beam_merging *how);
-/* Returns whether the signal may move the mean of ranges between near_m and far_m by more than BEAM_LEAST_SHIFT_M. 0
- * where there is no signal. */
-int beam_is_deep(const struct detect_signal *signal, double near_m, double far_m);
-/* Sets the gain of each return: the share of `back` that is received, relative to the first return. Returns the
- * amplitude A of rho = 1 at the first return. */
-double beam_gains(const struct detect_signal *signal, struct beam_return *returns, uint32_t n);
 /* Sorts returns by range, in place. */
 void beam_sort(struct beam_return *returns, uint32_t n);
 /* Merges the returns of one pulse into its echoes, by range; echo has room for most + 1. Reorders the

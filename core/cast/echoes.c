@@ -109,8 +109,7 @@ static void weigh_returns(struct caster *c, const struct chunk *k)
 {
     const struct cast_detect *d = k->s->detect;
     struct echo_list *l = &c->list;
-    const struct beam_merging how = {
-        .gap_m = d->separation_m, .pulse_m = k->s->pulse_m, .most = LINE_MAX_ECHOES, .signal = d->signal};
+    const struct beam_merging how = {.gap_m = d->separation_m, .pulse_m = k->s->pulse_m, .most = LINE_MAX_ECHOES};
     if (d->surfaces == NULL) {
         for (uint32_t i = 0; i < k->n; i++)
             l->rho[i] = 1.0;

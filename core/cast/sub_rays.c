@@ -177,7 +177,6 @@ static void finish_job(struct caster *c, const struct chunk *k, const struct job
         add_hits(c, k, job, i);
     /* Detection chooses among the echoes later. For it, as many are kept here as a pulse can have. */
     beam_merging(&k->s->beam->beam, k->s->detect != NULL ? LINE_MAX_ECHOES : caster_max_echoes(k->s), &how);
-    how.signal = caster_signal(k->s);
     uint32_t n = beam_merge(&how, w->returns, w->n_returns, &w->echo[w->n_echoes], &c->counters.crowded);
     c->counters.faint += w->is_silenced && n == 0;
     if (k->waves) waves_take_returns(c, k, job->pulse, w->returns, w->n_returns);
@@ -211,7 +210,6 @@ static void finish_alike(struct caster *c, const struct chunk *k, uint32_t first
     struct beam_merging how;
     struct beam_echo echo[BEAM_ALIKE];
     beam_merging(&k->s->beam->beam, 1, &how);
-    how.signal = caster_signal(k->s);
     const uint32_t merged = beam_merge_alike(&how, &alike, echo);
     for (uint32_t i = 0; i < BEAM_ALIKE; i++) {
         const struct job *job = &w->job[first + i];

@@ -54,24 +54,19 @@ static void parts_end(struct wave_work *w, uint32_t pulse, uint32_t n)
     w->n_parts += n;
 }
 
-/* Returns one part for sorted returns that lie close together. The part keeps their power, mean and variance. */
-static struct wave_part join_returns(const struct detect_signal *signal, struct beam_return *r, uint32_t n)
+/* Returns one part for returns that lie close together. The part keeps their power, mean and variance. */
+static struct wave_part join_returns(const struct beam_return *r, uint32_t n)
 {
-    const int deep = beam_is_deep(signal, r[0].range_m, r[n - 1].range_m);
-    const double nearest = deep ? beam_gains(signal, r, n) : 0.0;
-    double back = 0.0, first = 0.0, second = 0.0, strongest = 0.0;
+    double back = 0.0, first = 0.0, second = 0.0;
     uint32_t most = 0;
     for (uint32_t i = 0; i < n; i++) {
         const double d = r[i].range_m - r[0].range_m, sigma = (double)r[i].sigma_m;
-        const double power = deep ? r[i].back * (double)r[i].gain : r[i].back;
-        back += power;
-        first += power * d;
-        second += power * (d * d + sigma * sigma);
-        if (power > strongest) most = i;
-        strongest = power > strongest ? power : strongest;
+        back += r[i].back;
+        first += r[i].back * d;
+        second += r[i].back * (d * d + sigma * sigma);
+        if (r[i].back > r[most].back) most = i;
     }
     const double mean = first / back, sigma_m = sqrt(fmax(0.0, second / back - mean * mean));
-    if (deep) back *= nearest / detect_amplitude(signal, r[0].range_m + mean, 1.0);
     return (struct wave_part){.range_m = r[0].range_m + mean,
                               .back = back,
                               .extent_m = sigma_m,
@@ -82,15 +77,14 @@ static struct wave_part join_returns(const struct detect_signal *signal, struct 
 
 /* Joins sorted returns that are within apart_m of the first one of their group. Returns the number of groups; if
  * there are too many, WAVES_PARTS + 1. */
-static uint32_t join_groups(const struct detect_signal *signal, struct beam_return *r, uint32_t n, double apart_m,
-                            struct wave_part *part)
+static uint32_t join_groups(const struct beam_return *r, uint32_t n, double apart_m, struct wave_part *part)
 {
     uint32_t found = 0;
     for (uint32_t i = 0, end; i < n; i = end) {
         for (end = i + 1; end < n && r[end].range_m - r[i].range_m <= apart_m;)
             end++;
         if (found == WAVES_PARTS) return WAVES_PARTS + 1;
-        part[found++] = join_returns(signal, r + i, end - i);
+        part[found++] = join_returns(r + i, end - i);
     }
     return found;
 }
@@ -118,13 +112,12 @@ void waves_take_returns(struct caster *c, const struct chunk *k, uint32_t pulse,
 {
     struct wave_work *w = c->waves;
     struct wave_part *part = &w->part[parts_begin(w, pulse)];
-    const struct detect_signal *signal = caster_signal(k->s);
     double apart_m = least_apart_m(k->s->waves);
     n = keep_visible(k->s, r, n);
     if (n > FEW) beam_sort(r, n);
-    uint32_t found = n > FEW ? WAVES_PARTS + 1 : join_groups(signal, r, n, -(double)INFINITY, part);
+    uint32_t found = n > FEW ? WAVES_PARTS + 1 : join_groups(r, n, -(double)INFINITY, part);
     for (; found > WAVES_PARTS; apart_m *= 2.0) /* too many, as among branches: coarser groups keep all power */
-        found = join_groups(signal, r, n, apart_m, part);
+        found = join_groups(r, n, apart_m, part);
     parts_end(w, pulse, found);
 }
 

@@ -57,9 +57,6 @@ int detect_signal_set_up(const struct detect_signal_spec *spec, struct detect_si
     signal->jitter2 = (spec->sigma_m * spec->sigma_m - signal->floor2) * at_y * at_y;
     signal->per_distance = 1e-6 * spec->sigma_ppm;
     signal->extinction2_1_m = 2.0 * spec->extinction_1_m;
-    signal->steepest_1_m = fabs(signal->extinction2_1_m);
-    for (uint32_t k = 0; k < signal->n; k++)
-        signal->steepest_1_m += fabs(signal->more_1_m[k]);
     signal->signal_key = rng_key(spec->seed, RNG_SIGNAL);
     signal->range_key = rng_key(spec->seed, RNG_RANGE);
     return SH_OK;
@@ -87,22 +84,6 @@ double detect_amplitude(const struct detect_signal *signal, double range_m, doub
            vec_exp(-log_least(signal, range_m) - signal->extinction2_1_m * range_m);
 }
 
-/* The overlap rises with range, by less than the square of the range falls. */
-double detect_steepness(const struct detect_signal *signal, double range_m)
-{
-    return 2.0 / range_m + signal->steepest_1_m;
-}
-
-double detect_slope(const struct detect_signal *s, double range_m)
-{
-    const double x = range_m * range_m * s->per_overlap2;
-    double slope = -2.0 / range_m - s->more_1_m[0] - s->extinction2_1_m;
-    for (uint32_t k = 1; k < s->n; k++)
-        slope -= range_m > s->at_m[k] ? s->more_1_m[k] : 0.0;
-    if (s->per_overlap2 == 0.0) return slope;
-    return slope + 2.0 / range_m * (x < 1e-5 ? 1.0 : x / (vec_exp(x) - 1.0));
-}
-
 double detect_reflectance(const struct detect_signal *signal, double range_m, double amplitude)
 {
     return amplitude * vec_exp(log_least(signal, range_m)) / overlap(signal->per_overlap2, range_m);
@@ -127,25 +108,6 @@ static void sum_pieces(const struct detect_signal *s, uint32_t n, const double *
         for (uint32_t i = 0; i < n; i++)
             g[i] += more * (range_m[i] > at ? range_m[i] - at : 0.0);
     }
-}
-
-/* amplitude: holds g, becomes A for rho = 1. */
-VEC_CLONES
-static void find_unit_amplitudes(const struct detect_signal *s, uint32_t n, const double *restrict range_m,
-                                 double *restrict amplitude)
-{
-    const double per_overlap2 = s->per_overlap2, extinction2 = s->extinction2_1_m;
-    VEC_LOOP
-    for (uint32_t i = 0; i < n; i++) {
-        const double r = range_m[i] > 1e-6 ? range_m[i] : 1e-6;
-        amplitude[i] = overlap(per_overlap2, r) * vec_exp(-2.0 * vec_log(r) - amplitude[i] - extinction2 * r);
-    }
-}
-
-void detect_unit_amplitudes(const struct detect_signal *signal, uint32_t n, const double *range_m, double *amplitude)
-{
-    sum_pieces(signal, n, range_m, amplitude);
-    find_unit_amplitudes(signal, n, range_m, amplitude);
 }
 
 /* amplitude: holds g, becomes A. A range of NaN gives no A, and so no echo. */

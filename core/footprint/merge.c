@@ -30,51 +30,16 @@ void beam_sort(struct beam_return *r, uint32_t n)
         }
 }
 
-/* The first-order shift of a mean is at most the variance of the ranges times the change of log A with range. The
- * variance is at most a quarter of the square of the depth (T. Popoviciu, 1935). */
-int beam_is_deep(const struct detect_signal *signal, double near_m, double far_m)
+/* Returns the weight of a return: the power that comes back from it. If no power comes back from any of the returns
+ * (by_back 0), it is the energy of the return. */
+static double weight_of(const struct beam_return *r, int by_back)
 {
-    const double depth_m = far_m - near_m;
-    return signal != NULL && depth_m * depth_m * detect_steepness(signal, near_m) > 4.0 * BEAM_LEAST_SHIFT_M;
-}
-
-/* Returns whether the first-order shift is not enough. Let s be the bound of the change of log A with range. Then A is
- * curved by up to 1.5 s^2 of itself, as 1 / R^2 is, and the third moment is at most 0.096 of the depth's cube. The rest
- * of the shift is less than 0.1 s^2 times that cube. */
-static int is_curved(const struct detect_signal *signal, double near_m, double far_m)
-{
-    const double depth_m = far_m - near_m, s = detect_steepness(signal, near_m);
-    return 0.1 * s * s * depth_m * depth_m * depth_m > BEAM_LEAST_SHIFT_M;
-}
-
-double beam_gains(const struct detect_signal *signal, struct beam_return *r, uint32_t n)
-{
-    enum { BLOCK = 64 };
-    double range_m[BLOCK], amplitude[BLOCK], nearest = 0.0;
-    for (uint32_t at = 0, m; at < n; at += m) {
-        m = n - at < BLOCK ? n - at : BLOCK;
-        for (uint32_t i = 0; i < m; i++)
-            range_m[i] = r[at + i].range_m;
-        detect_unit_amplitudes(signal, m, range_m, amplitude);
-        if (at == 0) nearest = amplitude[0];
-        for (uint32_t i = 0; i < m; i++)
-            r[at + i].gain = (float)(amplitude[i] / nearest);
-    }
-    return nearest;
-}
-
-/* The weight of a return: the power that is received from it, relative to the nearest return (BY_POWER), or the power
- * that comes back (BY_BACK). If no power comes back from any of the returns, it is the energy of the return. */
-enum weighting { BY_ENERGY, BY_BACK, BY_POWER };
-
-static double weight_of(const struct beam_return *r, enum weighting by)
-{
-    return by == BY_BACK ? r->back : by == BY_POWER ? r->back * (double)r->gain : r->energy;
+    return by_back ? r->back : r->energy;
 }
 
 /* Finds the surface from which most power comes back, perhaps by many weak returns. Returns the index of its first
  * return. */
-static uint32_t of_strongest_surface(const struct beam_return *r, uint32_t n, enum weighting by)
+static uint32_t of_strongest_surface(const struct beam_return *r, uint32_t n, int by_back)
 {
     uint32_t best = 0;
     double most = -1.0;
@@ -85,7 +50,7 @@ static uint32_t of_strongest_surface(const struct beam_return *r, uint32_t n, en
             first++;
         if (first != i) continue;
         for (uint32_t k = i; k < n; k++)
-            if (r[k].label == r[i].label) sum += weight_of(&r[k], by);
+            if (r[k].label == r[i].label) sum += weight_of(&r[k], by_back);
         if (sum > most) {
             most = sum;
             best = i;
@@ -94,56 +59,45 @@ static uint32_t of_strongest_surface(const struct beam_return *r, uint32_t n, en
     return best;
 }
 
-/* An echo's mean range (relative to the first return's), the variance of its ranges, that variance without the spread
- * within the returns, and the index of the return that gives its surface. */
+/* An echo's mean range (relative to the first return's), the variance of its ranges, and the index of the
+ * return that gives its surface. */
 struct average {
-    double mean, variance, between;
+    double mean, variance;
     uint32_t strongest;
 };
 
 /* Averages returns, weighted by the power that comes back, or by energy; `all` is the sum of the
  * weights. */
 static struct average average(const struct beam_merging *how, const struct beam_return *r, uint32_t n, double all,
-                              enum weighting by)
+                              int by_back)
 {
     struct average a = {.strongest = 0};
-    double first = 0.0, second = 0.0, between = 0.0;
+    double first = 0.0, second = 0.0;
     int alike = 1;
     for (uint32_t i = 0; i < n; i++) {
-        double d = r[i].range_m - r[0].range_m, weight = weight_of(&r[i], by);
+        double d = r[i].range_m - r[0].range_m, weight = weight_of(&r[i], by_back);
         first += weight * d;
         second += weight * (d * d + (double)r[i].sigma_m * (double)r[i].sigma_m);
-        between += weight * (d * d);
-        if (weight > weight_of(&r[a.strongest], by)) a.strongest = i;
+        if (weight > weight_of(&r[a.strongest], by_back)) a.strongest = i;
         alike &= r[i].label == r[0].label;
     }
-    if (!alike && how->by_surface) a.strongest = of_strongest_surface(r, n, by);
+    if (!alike && how->by_surface) a.strongest = of_strongest_surface(r, n, by_back);
     a.mean = first / all;
     a.variance = fmax(0.0, second / all - a.mean * a.mean);
-    a.between = between / all - a.mean * a.mean;
     return a;
 }
 
-/* Makes one echo from returns without a gap between them. The nearest is the first one, and the farthest is at far_m.
- * Returns 0 where they are too weak for an echo. */
-static int make_echo(const struct beam_merging *how, struct beam_return *r, uint32_t n, double far_m,
-                     struct beam_echo *echo)
+/* Makes one echo from returns without a gap between them. Returns 0 where they are too weak for one. */
+static int make_echo(const struct beam_merging *how, const struct beam_return *r, uint32_t n, struct beam_echo *echo)
 {
-    const struct detect_signal *signal = how->signal;
-    const int deep = beam_is_deep(signal, r[0].range_m, far_m), curved = deep && is_curved(signal, r[0].range_m, far_m);
-    const double nearest = curved ? beam_gains(signal, r, n) : 0.0;
-    enum weighting by = curved ? BY_POWER : BY_BACK;
     double energy = 0.0, back = 0.0;
     struct average a = {.variance = (double)r[0].sigma_m * (double)r[0].sigma_m};
     for (uint32_t i = 0; i < n; i++) {
         energy += r[i].energy;
-        back += weight_of(&r[i], by);
+        back += r[i].back;
     }
     if (energy < how->least_energy) return 0;
-    if (!(back > 0.0)) by = BY_ENERGY;
-    if (n > 1) a = average(how, r, n, by == BY_ENERGY ? energy : back, by);
-    if (deep && !curved) a.mean += a.between * detect_slope(signal, r[0].range_m + a.mean);
-    if (curved) back *= nearest / detect_amplitude(signal, r[0].range_m + a.mean, 1.0);
+    if (n > 1) a = average(how, r, n, back > 0.0 ? back : energy, back > 0.0);
     *echo = (struct beam_echo){.range_m = r[0].range_m + a.mean,
                                .energy = energy,
                                .back = back,
@@ -155,15 +109,11 @@ static int make_echo(const struct beam_merging *how, struct beam_return *r, uint
 
 /* Drops the weakest echo. Echoes that differ by less than a float's resolution count as equal: the first
  * of them goes. */
-static void drop_weakest(const struct detect_signal *signal, struct beam_echo *e, uint32_t n)
+static void drop_weakest(struct beam_echo *e, uint32_t n)
 {
     uint32_t weakest = 0;
-    float least = INFINITY;
-    for (uint32_t i = 0; i < n; i++) {
-        const float power = (float)(signal != NULL ? detect_amplitude(signal, e[i].range_m, e[i].back) : e[i].back);
-        if (power < least) weakest = i;
-        least = power < least ? power : least;
-    }
+    for (uint32_t i = 0; i < n; i++)
+        if ((float)e[i].back < (float)e[weakest].back) weakest = i;
     memmove(e + weakest, e + weakest + 1, (n - weakest - 1) * sizeof *e);
 }
 
@@ -171,8 +121,8 @@ static void drop_weakest(const struct detect_signal *signal, struct beam_echo *e
 enum { MANY = 7 };
 
 /* Most footprints lie on one surface: there is no gap between their returns, whatever their order. The
- * nearest one goes to the front, as sorting would have it. far_m: the farthest range. */
-static int have_no_gap(double gap_m, struct beam_return *r, uint32_t n, double *far_m)
+ * nearest one goes to the front, as sorting would have it. */
+static int have_no_gap(double gap_m, struct beam_return *r, uint32_t n)
 {
     uint32_t nearest = 0;
     double farthest_m = r[0].range_m;
@@ -184,7 +134,6 @@ static int have_no_gap(double gap_m, struct beam_return *r, uint32_t n, double *
     struct beam_return one = r[0];
     r[0] = r[nearest];
     r[nearest] = one;
-    *far_m = farthest_m;
     return 1;
 }
 
@@ -193,16 +142,14 @@ uint32_t beam_merge(const struct beam_merging *how, struct beam_return *r, uint3
 {
     uint32_t found = 0;
     uint8_t number = 0;
-    double whole_m = 0.0;
-    const int is_whole = n >= MANY && have_no_gap(how->gap_m, r, n, &whole_m);
-    if (!is_whole) beam_sort(r, n);
+    if (n < MANY || !have_no_gap(how->gap_m, r, n)) beam_sort(r, n);
     for (uint32_t i = 0, end; i < n; i = end) {
         for (end = i + 1; end < n && r[end].range_m - r[end - 1].range_m <= how->gap_m;)
             end++;
-        if (!make_echo(how, r + i, end - i, is_whole ? whole_m : r[end - 1].range_m, &echo[found])) continue;
+        if (!make_echo(how, r + i, end - i, &echo[found])) continue;
         echo[found++].number = number++;
         if (found <= how->most) continue;
-        drop_weakest(how->signal, echo, found--);
+        drop_weakest(echo, found--);
         ++*left_out;
     }
     return found;
@@ -296,36 +243,6 @@ static void sum_returns(const struct beam_alike *alike, const struct reaches *of
     *sums = s;
 }
 
-/* Sums the squares of these ranges for each pulse, weighted as they are. */
-VEC_CLONES
-static void sum_squares(const struct beam_alike *alike, const struct reaches *of, double second[BEAM_ALIKE])
-{
-    const double *range_m = alike->range_m, *rho = alike->rho, energy = alike->energy;
-    const int64_t n = alike->n;
-    const struct reaches r = *of;
-    double sum[BEAM_ALIKE] = {0.0};
-    for (int64_t j = 1; j < n; j++)
-        for (int64_t i = 0; i < BEAM_ALIKE; i++) {
-            const int64_t at = i * n + (j == r.nearest[i] ? 0 : j);
-            const double here_m = range_m[at] - r.near_m[i], weight = rho != NULL ? energy * rho[at] : energy;
-            sum[i] += weight * (here_m * here_m);
-        }
-    memcpy(second, sum, sizeof sum);
-}
-
-/* Moves the means of deep pulses, whose bits are set, as make_echo does. */
-static void shift_means(const struct detect_signal *signal, const struct beam_alike *alike, const struct reaches *r,
-                        const struct lane_sums *sums, uint32_t deep, struct beam_echo *echo)
-{
-    double second[BEAM_ALIKE];
-    sum_squares(alike, r, second);
-    for (uint32_t i = 0; i < BEAM_ALIKE; i++) {
-        if ((deep >> i & 1) == 0) continue;
-        const double mean = sums->first[i] / echo[i].back, between = second[i] / echo[i].back - mean * mean;
-        echo[i].range_m = r->near_m[i] + (mean + between * detect_slope(signal, r->near_m[i] + mean));
-    }
-}
-
 /* Returns a bit for each pulse whose returns have one label. */
 VEC_CLONES
 static uint32_t have_one_label(const struct beam_alike *alike)
@@ -357,7 +274,7 @@ uint32_t beam_merge_alike(const struct beam_merging *how, const struct beam_alik
         sum_returns(alike, &r, &sums);
     else
         sum_ranges(alike, &r, &sums);
-    uint32_t done = have_one_label(alike), deep = 0;
+    uint32_t done = have_one_label(alike);
     for (uint32_t i = 0; i < BEAM_ALIKE; i++) {
         const double back = alike->rho != NULL ? sums.back[i] : energy;
         if (!r.is_whole[i] || !(r.far_m[i] - r.near_m[i] <= how->gap_m) || !(back > 0.0)) done &= ~(1U << i);
@@ -365,12 +282,6 @@ uint32_t beam_merge_alike(const struct beam_merging *how, const struct beam_alik
                                      .energy = energy,
                                      .back = back,
                                      .label = alike->label[i * alike->n]};
-        if ((done >> i & 1) == 0 || !beam_is_deep(how->signal, r.near_m[i], r.far_m[i])) continue;
-        if (is_curved(how->signal, r.near_m[i], r.far_m[i]))
-            done &= ~(1U << i);
-        else
-            deep |= 1U << i;
     }
-    if (deep != 0) shift_means(how->signal, alike, &r, &sums, deep, echo);
     return done;
 }

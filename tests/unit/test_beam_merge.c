@@ -8,7 +8,7 @@
 #include "core/vec3.h"
 #include "tests/common/cases.h"
 
-enum { MOST = 16, EACH = 19 };
+enum { MOST = 16 };
 
 static struct beam beam;
 static struct beam_merging how;
@@ -249,120 +249,9 @@ static void test_crowd(void **state)
     }
 }
 
-/* ---- power that is received */
-
-/* A lens that catches half of the light at 1.2 m or so, fog, and a data sheet of two ranges. */
-static void make_signal(struct detect_signal *signal)
-{
-    struct sh_err err;
-    const struct detect_signal_spec spec = {.n_reaches = 2,
-                                            .reach = {{0.1, 20.0}, {0.9, 55.0}},
-                                            .threshold_snr = 8.0,
-                                            .sharp = 1,
-                                            .overlap_m = 1.5,
-                                            .extinction_1_m = 0.01,
-                                            .sigma_m = 0.003,
-                                            .sigma_at_m = 20.0,
-                                            .sigma_reflectance = 0.9};
-    assert_int_equal(detect_signal_set_up(&spec, signal, &err), SH_OK);
-}
-
-/* Returns the amplitude of make_signal for rho = 1, by core/detect.h in long double. */
-static long double amplitude_at(long double range_m)
-{
-    const long double slope = (logl(9.0L) - 2.0L * logl(55.0L / 20.0L)) / 35.0L;
-    const long double least = 0.1L * range_m * range_m / 400.0L * expl(slope * (range_m - 20.0L));
-    return -expm1l(-range_m * range_m / 2.25L) * expl(-0.02L * range_m) / least;
-}
-
-/* An echo lies at the mean of its returns by received power, and has their power. Without a signal the mean is by the
- * light that comes back. Nineteen returns are merged several at a time, where they can be. */
-static void check_powers(const struct detect_signal *signal, double near_m, double depth_m, double *worst_m)
-{
-    struct beam_return r[EACH];
-    double range_m[BEAM_ALIKE * EACH], rho[BEAM_ALIKE * EACH];
-    uint32_t label[BEAM_ALIKE * EACH];
-    struct beam_merging with = how;
-    struct beam_echo alike[BEAM_ALIKE];
-    uint64_t left_out = 0;
-    long double all = 0.0L, sum = 0.0L, back = 0.0L, plain = 0.0L;
-    with.signal = signal;
-    for (uint32_t j = 0; j < EACH; j++) {
-        const double at_m = near_m + (j % 3 == 0 ? 0.0 : j % 3 == 1 ? depth_m : depth_m * j / EACH);
-        r[j] = (struct beam_return){.range_m = at_m, .energy = 1.0 / EACH, .label = 7};
-        for (uint32_t i = 0; i < BEAM_ALIKE; i++) {
-            range_m[i * EACH + j] = at_m;
-            rho[i * EACH + j] = 0.1 + 0.04 * j;
-            label[i * EACH + j] = 7;
-        }
-        r[j].back = r[j].energy * rho[j];
-        const long double power = (long double)r[j].back * amplitude_at((long double)at_m);
-        all += power;
-        sum += power * (long double)at_m;
-        back += (long double)r[j].back;
-        plain += (long double)r[j].back * (long double)at_m;
-    }
-    const struct beam_alike same = {EACH, 1.0 / EACH, range_m, label, rho};
-    const uint32_t bits = beam_merge_alike(&with, &same, alike);
-    assert_int_equal(beam_merge(&with, r, EACH, echo, &left_out), 1);
-    *worst_m = fmax(*worst_m, fabs(echo[0].range_m - (double)(sum / all)));
-    assert_true(fabs(detect_amplitude(signal, echo[0].range_m, echo[0].back) / (double)all - 1.0) < 1e-3);
-    for (uint32_t i = 0; i < BEAM_ALIKE; i++) {
-        if ((bits >> i & 1) == 0) continue;
-        assert_true(alike[i].range_m == echo[0].range_m && alike[i].back == echo[0].back);
-    }
-    assert_int_equal(beam_merge(&how, r, EACH, echo, &left_out), 1);
-    assert_true(fabs(echo[0].range_m - (double)(plain / back)) < 1e-12);
-}
-
-/* The bound is the first-order shift that is left out, and as much for its rest. */
-static void test_mean_by_received_power(void **state)
-{
-    (void)state;
-    static const double near_m[] = {0.5, 0.8, 1.0, 1.5, 3.0, 10.0, 19.9, 50.0, 200.0};
-    struct detect_signal signal;
-    double worst_m = 0.0;
-    make_signal(&signal);
-    for (int i = 0; i < 9; i++)
-        for (double depth_m = 1e-3; depth_m < how.gap_m; depth_m *= 1.3)
-            check_powers(&signal, near_m[i], depth_m, &worst_m);
-    print_message("# means by received power, 0.5 to 200 m: within %.3f mm\n", 1e3 * worst_m);
-    assert_true(worst_m < 2.0 * BEAM_LEAST_SHIFT_M);
-}
-
-/* Of too many echoes, that of the least received power is left out. The far ones return more light, and less of it is
- * received: 0.1 / 10^2 is the most, 0.5 / 40^2 the least. The surface of a mixed echo is that of most power: 0.4 at 1 m
- * against 0.6 at 1.5 m. */
-static void test_crowd_by_received_power(void **state)
-{
-    (void)state;
-    struct detect_signal signal;
-    struct sh_err err;
-    const struct detect_signal_spec spec = {.n_reaches = 1, .reach = {{0.9, 500.0}}, .threshold_snr = 8.0, .sharp = 1};
-    struct beam_merging few = how;
-    struct beam_return r[4], two[2] = {{.range_m = 1.0, .energy = 0.4, .back = 0.4, .label = 1},
-                                       {.range_m = 1.5, .energy = 0.6, .back = 0.6, .label = 2}};
-    uint64_t left_out = 0;
-    assert_int_equal(detect_signal_set_up(&spec, &signal, &err), SH_OK);
-    few.signal = &signal;
-    for (few.most = 1; few.most <= 3; few.most++) {
-        for (uint32_t i = 0; i < 4; i++)
-            r[i] =
-                (struct beam_return){.range_m = 10.0 * (i + 1), .energy = 0.2, .back = i == 0 ? 0.1 : 0.1 + 0.1333 * i};
-        assert_int_equal(beam_merge(&few, r, 4, echo, &left_out), few.most);
-        for (uint32_t i = 0; i < few.most; i++)
-            assert_true(echo[i].range_m == 10.0 * (i + 1));
-    }
-    assert_int_equal(left_out, 6);
-    assert_int_equal(beam_merge(&few, two, 2, echo, &left_out), 1);
-    assert_int_equal(echo[0].label, 1);
-    assert_int_equal(beam_merge(&how, two, 2, echo, &left_out), 1);
-    assert_int_equal(echo[0].label, 2);
-}
-
 /* ---- several pulses at a time */
 
-enum { ROWS = 400 };
+enum { EACH = 19, ROWS = 400 };
 
 /* A pulse of EACH returns. Most are on one surface; others have a gap, a miss, ranges at the resolution, equal nearest
  * ones, two labels, or no light that comes back. */
@@ -448,8 +337,6 @@ int main(void)
         cmocka_unit_test(test_gaps),
         cmocka_unit_test(test_two_caps),
         cmocka_unit_test(test_crowd),
-        cmocka_unit_test(test_mean_by_received_power),
-        cmocka_unit_test(test_crowd_by_received_power),
         cmocka_unit_test(test_at_the_resolution),
         cmocka_unit_test(test_definitions),
         cmocka_unit_test(test_axes),

@@ -192,29 +192,6 @@ static void amplitude_follows_the_range_equation(void **state)
     assert_int_equal(told(&signal, (double)NAN, 1.0), LINE_REFL_NONE);
 }
 
-/* Amplitudes of many ranges are those of one. The slope is that of two close amplitudes, and within its bound. */
-static void slope_is_that_of_the_amplitude(void **state)
-{
-    (void)state;
-    static const double range_m[] = {0.01, 0.4, 2.0, 3.9, 15.0, 77.0, 400.0, 1500.0, 0.2};
-    struct detect_signal_spec spec = spec_of(0.001, 4.0);
-    struct detect_signal signal;
-    double amplitude[9];
-    spec.n_reaches = 2;
-    spec.reach[1] = (struct detect_reach){0.05, 300.0};
-    set_up(&spec, &signal);
-    detect_unit_amplitudes(&signal, 9, range_m, amplitude);
-    for (int i = 0; i < 9; i++) {
-        const double r = range_m[i], step = 1e-4 * r;
-        const double two = detect_amplitude(&signal, r + step, 1.0) / detect_amplitude(&signal, r - step, 1.0);
-        assert_true(fabs(amplitude[i] / detect_amplitude(&signal, r, 1.0) - 1.0) < 1e-12);
-        /* differences have an error of step^2 / 6 times the third derivative, 4 / R^3; below 0.012 m the overlap
-         * is a series */
-        assert_true(fabs(log(two) / (2.0 * step) - detect_slope(&signal, r)) < 1e-5 / r);
-        assert_true(fabs(detect_slope(&signal, r)) < (1.0 + 1e-12) * detect_steepness(&signal, r));
-    }
-}
-
 /* Kim's table: in fog, up to a visibility V of 500 m, extinction is 3.912 / V at any wavelength. From 0.5 to 1 km the
  * exponent is q = V / km - 0.5, without a step at either end. Haze of 4 km has q = 0.98, clear air of 23 km q = 1.3. */
 static void extinction_by_visibility(void **state)
@@ -455,7 +432,6 @@ int main(void)
         cmocka_unit_test(amplitude_follows_the_range_equation),
         cmocka_unit_test(a_lobe_ends_beside_the_surface),
         cmocka_unit_test(dark_colours_are_straight),
-        cmocka_unit_test(slope_is_that_of_the_amplitude),
         cmocka_unit_test(extinction_by_visibility),
         cmocka_unit_test(range_noise_has_a_floor),
         cmocka_unit_test(noise_alone_has_a_range),
