@@ -26,7 +26,9 @@
  * there are more echoes than the head can report, the weakest are left out, and counted. Where surfaces are
  * modelled (core/surface.h), the weight of a return is the power that comes back: energy times the surface's
  * return, times the share that glass and mirrors before it let through. The 1 % is still of the footprint's
- * energy. Where no return sends anything back, energy is the weight.
+ * energy. Where no return sends anything back, energy is the weight. The weight leaves out distance: near the head a
+ * mixed pixel is farther away than the centroid of its light, by (d/2)^2 2/R for two halves d apart at the range R, and
+ * what counts as weakest here may not be what is received as weakest.
  *
  * Width. An echo's width adds two widths as squares: that of the pulse, resolution_m, and 2.355 sigma of its
  * ranges (full widths at half maximum of Gaussians). A return may stand for a part of the footprint, or for
