@@ -163,7 +163,6 @@ static void pty_let_go(struct pty_link *pty)
     pty->due_closed = pty->due_closed || (pty->open && !pty->due_opened);
     pty->open = pty->due_opened = 0;
     pty->open_event_due = 0; /* else the next client would be taken for one that is counted */
-    pty->count = 0;
     pty->line.n_out = 0;
     inotify_rm_watch(pty->inotify, pty->watch);
     pty_read_inotify(pty, 0);

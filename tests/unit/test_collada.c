@@ -127,6 +127,23 @@ static void colours_and_transparency(void **state)
     }
 }
 
+/* What Assimp itself warns of is passed on. The triangles have the material "q", which the node binds to nothing. */
+static void warnings_of_the_reader_are_passed_on(void **state)
+{
+    (void)state;
+    struct scene *s;
+    struct sh_err err;
+    char text[8192];
+    snprintf(text, sizeof text, DAE, "<color>1 1 1 1</color>", "");
+    strstr(text, "material=\"m\"")[10] = 'q';
+    const struct scene_mesh_spec spec = {.file = write_text("m.dae", text), .up = SCENE_UP_Y, .scale = 1};
+    if (load_spec(&spec, 1, &s, &err) != SH_OK) fail_msg("%s", err.text);
+    if (strstr(warnings, "m.dae: 1 warnings while it was read, the first: Collada: No material") == NULL)
+        fail_msg("%s", warnings);
+    unlink(path);
+    scene_free(s);
+}
+
 /* Assimp seeks from the begin, from where it is and from the end, as fseek does. Asking for the size moves nothing. */
 static void files_are_read_anywhere(void **state)
 {
@@ -294,6 +311,7 @@ int main(void)
         cmocka_unit_test(coordinates_are_scaled_and_shifted),
         cmocka_unit_test(a_texture_has_its_set_of_coordinates),
         cmocka_unit_test(colours_and_transparency),
+        cmocka_unit_test(warnings_of_the_reader_are_passed_on),
         cmocka_unit_test(files_are_read_anywhere),
         cmocka_unit_test(a_mirrored_node_keeps_its_outer_side),
         cmocka_unit_test(a_skew_is_refused),

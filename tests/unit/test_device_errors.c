@@ -89,6 +89,33 @@ static void a_replay_says_what_it_refused(void **state)
     }
 }
 
+/* While a journal still has commands, only the journal moves stations. After its last command clients may, whether
+ * the journal has an END or none. */
+static void clients_move_after_a_journals_last_command(void **state)
+{
+    (void)state;
+    static const char *const ends[] = {"", "400 400000000 0 END\n"};
+    for (int i = 0; i < 2; i++) {
+        struct command_result result;
+        FILE *f = fopen(journal_path, "w");
+        assert_non_null(f);
+        fprintf(f, "# scanhead journal 1\n310 310000000 1 SITE:POSE 1, 2,0,0,0,0,0\n%s", ends[i]);
+        assert_int_equal(fclose(f), 0);
+        struct rig *rig = rig_open(&(struct device_options){.replay = journal_path}, NULL, 0);
+        rig_go_to(rig, 305);
+        device_command(rig->device, 1, "SITE:POSE 1, 3,0,0,0,0,0", rig->next, &result);
+        assert_non_null(strstr(result.reply, "a journal is being replayed"));
+        rig_go_to(rig, 315);
+        assert_string_equal(rig_tell(rig, "SITE:POSE? 1", rig->next), "2,0,0,0,0,0");
+        device_command(rig->device, 1, "SITE:POSE 1, 3,0,0,0,0,0", rig->next, &result);
+        assert_int_equal(result.effect, COMMAND_MOVE);
+        device_plan_move(rig->device);
+        device_finish_move(rig->device, rig->next, &result);
+        assert_string_equal(rig_tell(rig, "SITE:POSE? 1", rig->next), "3,0,0,0,0,0");
+        rig_close(rig);
+    }
+}
+
 /* The error that the next query takes from the queue. */
 static const char *next_error(struct rig *rig)
 {
@@ -221,6 +248,7 @@ int main(void)
         cmocka_unit_test(the_last_events_are_said_however_many),
         cmocka_unit_test(errors_are_held_back_by_session),
         cmocka_unit_test(a_replay_says_what_it_refused),
+        cmocka_unit_test(clients_move_after_a_journals_last_command),
         cmocka_unit_test(a_client_that_goes_is_an_error_where_it_is_missed),
         cmocka_unit_test(a_line_that_is_too_long_is_an_error_of_its_session),
         cmocka_unit_test(telemetry_has_the_figures_of_its_tick),

@@ -178,13 +178,24 @@ static void row_place(const struct row *row, int i, double p_m[3])
     p_m[2] = row->z_m;
 }
 
+/* Ends a picture, and returns its pixels; free them. */
+static uint8_t *finished(struct picturing *p)
+{
+    png_image image = {.version = PNG_IMAGE_VERSION};
+    uint8_t *rgb = malloc(3 * SIDE_PX * SIDE_PX);
+    assert_non_null(rgb);
+    if (picturing_finish(p, &err) != SH_OK) fail_msg("%s", err.text);
+    picturing_end(p);
+    assert_true(png_image_begin_read_from_file(&image, path));
+    image.format = PNG_FORMAT_RGB;
+    assert_true(png_image_finish_read(&image, NULL, rgb, 0, NULL));
+    return rgb;
+}
+
 /* Draws the rows, with or without a configuration. Returns the picture's pixels; free it. */
 static uint8_t *drawn_rows(const struct site *site)
 {
     struct picturing *p;
-    png_image image = {.version = PNG_IMAGE_VERSION};
-    uint8_t *rgb = malloc(3 * SIDE_PX * SIDE_PX);
-    assert_non_null(rgb);
     assert_int_equal(picturing_begin(&plan, &p, &err), SH_OK);
     p->site = site;
     assert_int_equal(picturing_look(p, &(struct picturing_bounds){{-1, 0, -1}, {1, 0, 1}}, &err), SH_OK);
@@ -194,12 +205,7 @@ static uint8_t *drawn_rows(const struct site *site)
             row_place(&rows[r], i, p_m);
             picturing_add(p, p_m, &(struct picturing_figures){rows[r].z_m, -12, rows[r].label, rows[r].station, NULL});
         }
-    if (picturing_finish(p, &err) != SH_OK) fail_msg("%s", err.text);
-    picturing_end(p);
-    assert_true(png_image_begin_read_from_file(&image, path));
-    image.format = PNG_FORMAT_RGB;
-    assert_true(png_image_finish_read(&image, NULL, rgb, 0, NULL));
-    return rgb;
+    return finished(p);
 }
 
 /* A case: how the rows are coloured, and the legend. A legend without names is a scale. Limits that are not given are
@@ -313,6 +319,33 @@ static void a_picture_has_marks_and_a_legend(void **state)
     }
 }
 
+/* Each label of 16 bits has a point, all at one place in the upper right. The legend names those that it has room for,
+ * and counts the others. */
+static void every_label_may_have_points(void **state)
+{
+    enum { LABELS = 65536, HALF = SIDE_PX / 2 };
+    struct view_entry entry[VIEW_MAX_NAMES];
+    struct picturing *p;
+    struct picture want;
+    (void)state;
+    plan_it("label", NULL);
+    assert_int_equal(picturing_begin(&plan, &p, &err), SH_OK);
+    assert_int_equal(picturing_look(p, &(struct picturing_bounds){{-1, 0, -1}, {1, 0, 1}}, &err), SH_OK);
+    for (int i = 0; i < LABELS; i++)
+        picturing_add(p, (const double[3]){0.9, 0, 0.9}, &(struct picturing_figures){.label = (uint16_t)i});
+    uint8_t *got = finished(p);
+    assert_int_equal(picture_make(&want, SIDE_PX, SIDE_PX, (const uint8_t[3]){252, 252, 252}, &err), SH_OK);
+    for (uint32_t i = 0; i < VIEW_MAX_NAMES; i++) {
+        snprintf(entry[i].name, sizeof entry[i].name, "label %u", i);
+        colour_number(i, entry[i].rgb);
+        paler(entry[i].rgb);
+    }
+    view_draw_names(&want, "Surfaces", entry, LABELS);
+    assert_memory_equal(got + 3 * HALF * SIDE_PX, want.rgb + 3 * HALF * SIDE_PX, 3 * HALF * SIDE_PX);
+    picture_free(&want);
+    free(got);
+}
+
 static int make_path(void **state)
 {
     (void)state;
@@ -331,8 +364,8 @@ static int remove_path(void **state)
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(figures_are_colours),
-                                       cmocka_unit_test(what_is_not_known_is_an_error),
-                                       cmocka_unit_test(a_picture_has_marks_and_a_legend)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(figures_are_colours), cmocka_unit_test(every_label_may_have_points),
+        cmocka_unit_test(what_is_not_known_is_an_error), cmocka_unit_test(a_picture_has_marks_and_a_legend)};
     return cmocka_run_group_tests_name("map picture", tests, make_path, remove_path);
 }

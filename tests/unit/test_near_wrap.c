@@ -67,13 +67,13 @@ static void cola_times_pass_the_wrap(void **state)
     assert_int_equal(strncmp(cola_ask("sRN LIDoutputstate"), now, strlen(now)), 0);
 }
 
-/* The time stamp is ms in 24 bits, 75 ms below the wrap. The fourth of the turns of 25 ms begins at it. */
-static void scip_times_pass_the_wrap(void **state)
+/* Opens a SCIP head 75 ms below the wrap, and takes six turns of 25 ms, the first at t0_ns. */
+static void turn_past_the_wrap(int64_t t0_ns)
 {
-    (void)state;
     static struct scip_decoded scan;
     scip_open("UTM-30LX");
     open_again(&rig, 75);
+    rig.scan_t0_ns = t0_ns;
     scip_ask("MD0000108000000\n", "MD0000108000000\n00P\n\n");
     for (uint32_t line = 0; line < 6; line++) {
         scip_turn(line);
@@ -81,6 +81,15 @@ static void scip_times_pass_the_wrap(void **state)
         assert_int_equal(scan.time_ms, (line * 25 + 0x1000000 - 75) % 0x1000000);
         protocol_rig_clear(&rig);
     }
+}
+
+/* The time stamp is ms in 24 bits. The fourth of the turns begins at the wrap. Parts of a millisecond do not count,
+ * before the wrap either: a turn 74.7 ms before it has the stamp of one 75 ms before. */
+static void scip_times_pass_the_wrap(void **state)
+{
+    (void)state;
+    turn_past_the_wrap(300000);
+    turn_past_the_wrap(0);
     /* RS sets it to 0, as always. After a reboot it begins as at power-up. */
     scip_ask("RS\nTM0\nTM1\nTM2\n", "RS\n00P\n\nTM0\n00P\n\nTM1\n00P\n00000\n\nTM2\n00P\n\n");
     scip_ask("RB\nRB\n", "RB\n01Q\n\nRB\n00P\n\n");

@@ -94,6 +94,11 @@ static void test_what_cannot_be_had(void **state)
     expect(&row, "e", 0, "the only possible one; its error is not known");
     expect_left(&row, 0, "f", "the head moves");
     assert_false(plan_holds(&some[0], &TOLERANCE) || plan_holds(&some[1], &TOLERANCE));
+    /* Where there is one option, it is chosen: d, which would hold, is beyond the end of the list. */
+    const struct plan_option alone[2] = {some[0], options[3]};
+    assert_int_equal(choose(&row, "beam", alone, 1, -1, ""), 0);
+    expect(&row, "e", 0, "the only possible one; its error is not known");
+    assert_int_equal(row.n_left, 0);
 }
 
 /* For the cast nothing is chosen: the row has the method that is always used. */

@@ -70,6 +70,18 @@ static void test_float_far_away(void **state)
     put_points(0);
     assert_int_equal(record(out_path, (struct recorder_options){.columns = columns}, 1, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, "coordinates of 21475 m as float would be wrong by up to 0.0013 m"));
+
+    /* One far point is enough, be it the first of its frame or the last. */
+    for (int far = 0; far < N; far += N - 1) {
+        begin_stream();
+        put_descriptor(1, 1, 0);
+        put(native_encode_anchor(out, sizeof out, &origin, 0, 0));
+        for (int i = 0; i < N; i++)
+            a[i] = b[i] = c[i] = i == far ? 200000000 : 0;
+        put_points(0);
+        assert_int_equal(record(out_path, (struct recorder_options){.columns = columns}, 1, &err), SH_EINPUT);
+        assert_non_null(strstr(err.text, "coordinates of 2000 m as float"));
+    }
 }
 
 static void test_cloudcompare(void **state)

@@ -87,6 +87,18 @@ static void a_tripod_is_too_high_at_a_stop(void **state)
         fail_msg("%s", err.text);
 }
 
+/* The third stop of a georeferenced scene is 150 km up, where no scene on the Earth may be. Stops count from 1. */
+static void the_stop_that_is_not_on_the_earth_is_named(void **state)
+{
+    (void)state;
+    struct site *site;
+    static const char path[] = "t_s,x_m,y_m,z_m,heading_deg,pitch_deg,roll_deg\n0,0,0,2,0,0,0\n1,0,0,2,0,0,0\n"
+                               "2,0,0,150000,0,0,0\n";
+    assert_int_equal(try_path(path, ", lat_deg: 48, lon_deg: 11, height_m: 300", "step_s: 1", &site), SH_EINPUT);
+    if (strstr(err.text, ": stop 3: scene point 0 0 150000: not near the Earth's surface") == NULL)
+        fail_msg("%s", err.text);
+}
+
 /* The mount turns the head on the body: heading, pitch and roll each by itself, and its arm with it. */
 static void the_mount_turns_the_head(void **state)
 {
@@ -115,6 +127,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(the_last_stop_is_at_the_end, site_rig_setup, site_rig_teardown),
         cmocka_unit_test_setup_teardown(a_part_may_end_with_the_path, site_rig_setup, site_rig_teardown),
         cmocka_unit_test_setup_teardown(a_tripod_is_too_high_at_a_stop, site_rig_setup, site_rig_teardown),
+        cmocka_unit_test_setup_teardown(the_stop_that_is_not_on_the_earth_is_named, site_rig_setup, site_rig_teardown),
         cmocka_unit_test_setup_teardown(the_mount_turns_the_head, site_rig_setup, site_rig_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

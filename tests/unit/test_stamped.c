@@ -80,6 +80,17 @@ static struct stamped_datagram take(const struct stamped_socket *s, const char *
     return d;
 }
 
+/* Several programs may wait for the kernel's stamps at the same time. Each keeper has a port of its own. */
+static void a_second_keeper_is_open_beside_the_first(void **state)
+{
+    (void)state;
+    struct stamped_socket second;
+    stamped_begin(&second);
+    assert_true(second.fd >= 0);
+    assert_int_not_equal(port_of(second.fd), port_of(keeper.fd));
+    stamped_close(&second);
+}
+
 /* All addresses of the machine are read; the datagram has the one that it was sent to. The time is when it came. */
 static void a_datagram_has_its_addresses_and_time(void **state)
 {
@@ -278,6 +289,7 @@ static int tear_down(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_second_keeper_is_open_beside_the_first),
         cmocka_unit_test(a_datagram_has_its_addresses_and_time),
         cmocka_unit_test(a_datagram_of_ipv6_too),
         cmocka_unit_test(lost_datagrams_are_counted),

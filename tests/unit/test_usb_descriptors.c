@@ -84,14 +84,33 @@ static void test_strings(void **state)
     assert_int_equal(host_control(host, 0x80, USB_REQ_GET_DESCRIPTOR, 0x0301, 0x0407, 255, NULL), USB_STALL);
     assert_int_equal(host_control(host, 0x80, USB_REQ_GET_DESCRIPTOR, 0x0301, 0, 255, NULL), USB_STALL);
     host_free(host);
-    /* A malformed serial number neither overruns nor vanishes. */
-    struct usb_identity id = {.serial = "\xc3"};
-    uint8_t out[16];
-    static const uint8_t replaced[] = {4, 3, 0xfd, 0xff};
-    assert_int_equal(usb_describe_string(&pair_model, &id, 3, out, sizeof out), 4);
-    assert_memory_equal(out, replaced, 4);
-    id.serial[0] = '\0';
-    assert_int_equal(usb_describe_string(&pair_model, &id, 3, out, sizeof out), 0);
+}
+
+/* UTF-8 (RFC 3629) becomes UTF-16LE. What is malformed neither overruns nor vanishes: U+FFFD stands for it. */
+static void test_utf16(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *serial;
+        uint8_t bytes[7];
+    } cases[] = {
+        {"\xe2\x82\xac", {4, 3, 0xac, 0x20}},
+        {"\xf4\x8f\xbf\xbf", {6, 3, 0xff, 0xdb, 0xff, 0xdf}}, /* U+10FFFF is the last one */
+        {"\xf4\x90\x80\x80", {4, 3, 0xfd, 0xff}},
+        {"\xf7\xbf\xbf\xbf", {4, 3, 0xfd, 0xff}},
+        {"\xc3", {4, 3, 0xfd, 0xff}}, /* it ends too early */
+        {"\x80", {4, 3, 0xfd, 0xff}}, /* no character begins like this */
+        {"\xff\x41", {6, 3, 0xfd, 0xff, 0x41, 0}},
+        {"\xf8\x41", {6, 3, 0xfd, 0xff, 0x41, 0}},
+        {"", {0}}, /* there is no such string */
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        struct usb_identity id = {.serial = ""};
+        uint8_t out[16];
+        snprintf(id.serial, sizeof id.serial, "%s", cases[i].serial);
+        assert_int_equal(usb_describe_string(&pair_model, &id, 3, out, sizeof out), cases[i].bytes[0]);
+        assert_memory_equal(out, cases[i].bytes, cases[i].bytes[0]);
+    }
 }
 
 static const uint8_t platform_uuid[16] = {0xdf, 0x60, 0xdd, 0xd8, 0x89, 0x45, 0xc7, 0x4c,
@@ -250,10 +269,11 @@ static void test_contradictions(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_device),         cmocka_unit_test(test_configuration),
-        cmocka_unit_test(test_strings),        cmocka_unit_test(test_bos),
-        cmocka_unit_test(test_ms_os),          cmocka_unit_test(test_head),
-        cmocka_unit_test(test_contradictions), cmocka_unit_test(test_no_bos),
+        cmocka_unit_test(test_device),  cmocka_unit_test(test_configuration),
+        cmocka_unit_test(test_strings), cmocka_unit_test(test_utf16),
+        cmocka_unit_test(test_bos),     cmocka_unit_test(test_ms_os),
+        cmocka_unit_test(test_head),    cmocka_unit_test(test_contradictions),
+        cmocka_unit_test(test_no_bos),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -313,6 +313,9 @@ static void low_and_high_mean_the_same_in_views(void **state)
         const double apart_deg = fabs(remainder(hue_deg(view) - hue_deg(map), 360.0));
         if (apart_deg > 60.0) fail_msg("%d/20: hues %.0f and %.0f", i, hue_deg(view), hue_deg(map));
     }
+    uint8_t unknown[3] = {1, 2, 3};
+    view_ramp((double)NAN, unknown);
+    assert_memory_equal(unknown, colour_unknown, 3);
 }
 
 int main(void)

@@ -256,6 +256,31 @@ static void test_messages(void **state)
     free(text);
 }
 
+/* A link has a port of its own kind, though the other one comes first in the capture: datagrams go to the client of the
+ * udp link, and nothing of the tcp port does. With --device-port it has that port or none. */
+static void test_kinds(void **state)
+{
+    struct wire *wire = *state;
+    char link[60], byte;
+    int port;
+    const int fd = open_receiver(&port);
+    snprintf(link, sizeof link, "type: udp, port: %d", port);
+    struct head head = head_start(wire, make_mixed(wire), (const char *const[]){"--link", link, NULL});
+    struct pollfd slot = {.fd = fd, .events = POLLIN};
+    assert_int_equal(poll(&slot, 1, SOON_MS), 1);
+    assert_int_equal(recv(fd, &byte, 1, MSG_TRUNC), 1);
+    assert_true(byte == 'g' || byte == 'd');
+    close(fd);
+    head_end(&head, SIGTERM);
+    char *text = wire_read(wire_path(wire, "head.err"), NULL);
+    assert_int_equal(lines_with(text, "tcp port 2112 of 10.0.0.1 is not served: no link is left for it\n"), 1);
+    free(text);
+    const char *const none[] = {"run", make_mixed(wire), "--device-port", "2112", "--link", link, NULL};
+    assert_int_equal(replay_call(wire, none), 2);
+    replay_said(wire, ": no port of ");
+    replay_said(wire, "is left for it with --device-port; it has tcp 2112 of 10.0.0.1, udp 40000 of 10.0.0.1\n");
+}
+
 /* Each unknown request is said once. After 63 different ones the head says that it says no more: it remembers 64. */
 static void test_unknown_requests(void **state)
 {
@@ -305,6 +330,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_udp, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_loop_has_no_end, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_messages, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_kinds, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_unknown_requests, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_refused, wire_setup, wire_teardown),
     };
