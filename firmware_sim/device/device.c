@@ -213,7 +213,7 @@ void device_free(struct device *device)
     if (device == NULL) return;
     journal_close(device->journal.out, NULL);
     fault_board_free(device->faults);
-    device_free_variants(&device->variants);
+    device_free_versions(&device->variants.list);
     free(device->journal.replay);
     free(device->station_scans);
     free(device->live.sample);
@@ -300,7 +300,7 @@ int device_claim(struct device *device, struct device_work *work)
     work->t_ns = (int64_t)tick * device->tick_ns;
     replay(device, tick);
     run_faults(device, tick, work);
-    device_use_site(&device->moves, work);
+    work->version = device_use(device->moves.current);
     device_run_timers(device, tick);
     device_follow_ptp(device, tick);
     const int off = device->machine.state == HEAD_OFF;

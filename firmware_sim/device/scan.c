@@ -10,7 +10,7 @@
 
 /* Plans the site for the settings. The plan may fail although each setting was accepted: without memory, or because the
  * scan begins at another station. */
-static int plan_scan(struct device *device, struct device_variant **variant, uint64_t tick)
+static int plan_scan(struct device *device, struct device_version **variant, uint64_t tick)
 {
     const struct head_settings *settings = &device->cmd.settings;
     struct sh_err err;
@@ -34,7 +34,7 @@ void device_count_duration(struct device *device, uint64_t tick)
 void device_begin_scan(struct device *device, uint64_t tick)
 {
     struct schedule_spec spec;
-    struct device_variant *variant;
+    struct device_version *variant;
     if (!plan_scan(device, &variant, tick)) return;
     const struct site *site = variant != NULL ? variant->site : device->site;
     device->scan = (struct device_scan){.on = 1,
@@ -134,8 +134,7 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
     int stop = device->scan.stop_requested || device->ending || tick >= device->end_tick;
     work->scanning = 1;
     work->site = device->scan.site;
-    work->variant = device->scan.variant;
-    if (work->variant != NULL) atomic_fetch_add(&work->variant->users, 1);
+    work->variant = device_use(device->scan.variant);
     work->scan_t0_ns = (int64_t)device->scan.tick0 * device->tick_ns;
     work->station = device->scan.station;
     work->station_scan = device->scan.station_scan;
