@@ -32,7 +32,7 @@ static int set_up_commands(struct device *device, struct sh_err *err)
     const struct config_profile *p = &cfg->profile;
     device_set_limits(device->site, &device->cmd.limits);
     device->cmd.can_plan = device_can_plan;
-    device->cmd.owner = &device->variants;
+    device->cmd.owner = device;
     device->cmd.settings = device->cmd.defaults = cfg->head.settings;
     int len = snprintf(device->idn, sizeof device->idn, "%s,%s,%s,scanhead native %d", p->maker, p->model,
                        cfg->head.serial, NATIVE_VERSION);
@@ -95,8 +95,6 @@ static void set_parts(struct device *device)
     device->overrun.counters = &device->counters;
     device->overrun.events = &device->events;
     device->overrun.queue = &device->cmd.queue;
-    device->variants.moves = &device->moves;
-    device->variants.scan = &device->scan;
 }
 
 static void write_note(void *ctx, const struct fault_note *note)
@@ -213,7 +211,6 @@ void device_free(struct device *device)
     if (device == NULL) return;
     journal_close(device->journal.out, NULL);
     fault_board_free(device->faults);
-    device_free_versions(&device->variants.list);
     free(device->journal.replay);
     free(device->station_scans);
     free(device->live.sample);

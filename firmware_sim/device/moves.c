@@ -164,7 +164,7 @@ static void move_last_scan(struct device *device)
     struct device_version *variant = NULL;
     struct sh_err err;
     if (scan->variant != NULL &&
-        device_find_variant(&device->variants, &scan->variant->settings, scan->station, &variant, &err) != SH_OK)
+        device_find_variant(device, &scan->variant->settings, scan->station, &variant, &err) != SH_OK)
         variant = NULL;
     scan->variant = variant;
     scan->site = variant != NULL ? variant->site : device->site;
@@ -181,7 +181,7 @@ static int swap(struct device *device, struct sh_err *err)
     const struct head_settings *now = &device->cmd.settings;
     struct device_version *variant;
     use(device, moves->made);
-    int rc = device_find_variant(&device->variants, now, now->station - 1, &variant, err);
+    int rc = device_find_variant(device, now, now->station - 1, &variant, err);
     if (rc != SH_OK) {
         use(device, was);
         return rc;
@@ -191,7 +191,7 @@ static int swap(struct device *device, struct sh_err *err)
     moves->old = was;
     device_set_places(device->site, moves->place);
     move_last_scan(device);
-    device_free_unused(&device->variants.list, device->scan.variant); /* these hold the earlier site */
+    device_free_unused(&moves->variants, device->scan.variant); /* these hold the earlier site */
     return SH_OK;
 }
 

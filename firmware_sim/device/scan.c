@@ -14,7 +14,7 @@ static int plan_scan(struct device *device, struct device_version **variant, uin
 {
     const struct head_settings *settings = &device->cmd.settings;
     struct sh_err err;
-    if (device_find_variant(&device->variants, settings, settings->station - 1, variant, &err) == SH_OK) return 1;
+    if (device_find_variant(device, settings, settings->station - 1, variant, &err) == SH_OK) return 1;
     command_queue_push(&device->cmd.queue, CMD_E_SETTINGS, err.text);
     device_push_error(&device->events, 0, CMD_E_SETTINGS, err.text);
     device_transition(device, HEAD_EV_FAIL, tick);
@@ -193,8 +193,7 @@ void device_before_scans(struct device *device)
     device_end_beam(&device->beam, 0);
     scan->settings = *settings;
     scan->station = settings->station - 1;
-    if (device_find_variant(&device->variants, settings, scan->station, &scan->variant, &err) != SH_OK)
-        scan->variant = NULL;
+    if (device_find_variant(device, settings, scan->station, &scan->variant, &err) != SH_OK) scan->variant = NULL;
     scan->site = scan->variant != NULL ? scan->variant->site : device->site;
     device_fill_spec(&device->beam, scan->site, &spec);
     schedule_start(&scan->segment, &spec);

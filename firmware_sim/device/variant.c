@@ -4,27 +4,28 @@
  * made, or a station moves, each variant is freed that no scan, work or observer needs. */
 #include <stdio.h>
 
-#include "firmware_sim/device/variant.h"
+#include "firmware_sim/device/device_state.h"
 
 /* Whether the variant is planned for these settings and the stations' present places. */
-static int fits(const struct device_variants *all, const struct device_version *v, const struct head_settings *settings,
+static int fits(const struct device *device, const struct device_version *v, const struct head_settings *settings,
                 uint32_t station)
 {
-    return v->from == all->moves->current && v->station == station && !site_varies(&v->settings, settings);
+    return v->from == device->moves.current && v->station == station && !site_varies(&v->settings, settings);
 }
 
-int device_find_variant(struct device_variants *variants, const struct head_settings *settings, uint32_t station,
+int device_find_variant(struct device *device, const struct head_settings *settings, uint32_t station,
                         struct device_version **out, struct sh_err *err)
 {
-    const struct site *site = variants->moves->current->site;
+    struct device_moves *moves = &device->moves;
+    const struct site *site = moves->current->site;
     *out = NULL;
     if (!site_varies(settings, site_settings(site))) return SH_OK;
-    for (struct device_version *v = variants->list; v != NULL; v = v->next)
-        if (fits(variants, v, settings, station)) {
+    for (struct device_version *v = moves->variants; v != NULL; v = v->next)
+        if (fits(device, v, settings, station)) {
             *out = v;
             return SH_OK;
         }
-    device_free_unused(&variants->list, variants->scan->variant);
+    device_free_unused(&moves->variants, device->scan.variant);
     struct site *own;
     int rc = site_vary(site, settings, station, &own, err);
     if (rc != SH_OK) return rc;
@@ -33,11 +34,11 @@ int device_find_variant(struct device_variants *variants, const struct head_sett
         site_vary_free(own);
         return sh_fail(err, SH_ENOMEM, "no memory");
     }
-    v->from = device_use(variants->moves->current);
+    v->from = device_use(moves->current);
     v->settings = *settings;
     v->station = station;
-    v->next = variants->list;
-    *out = variants->list = v;
+    v->next = moves->variants;
+    *out = moves->variants = v;
     return SH_OK;
 }
 

@@ -104,6 +104,7 @@ int device_open_moves(struct device_moves *moves, const struct site *site, struc
 
 void device_close_moves(struct device_moves *moves)
 {
+    device_free_versions(&moves->variants);
     device_free_versions(&moves->old);
     device_free_versions(&moves->ahead);
     device_free_version(moves->made);

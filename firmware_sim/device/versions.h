@@ -12,7 +12,7 @@
 #include "firmware_sim/site/site.h"
 
 /* A site that is kept while it is in use: by the device, and by ticks that were claimed while it was the device's. Or a
- * variant (variant.h), kept while a scan or a tick's work uses it. */
+ * variant (variant.c), kept while a scan or a tick's work uses it. */
 struct device_version {
     const struct site *site;
     struct site *own;       /* the site, which is freed with the version; NULL: device_create's caller frees it */
@@ -28,7 +28,8 @@ struct device_version {
 struct device_moves {
     const struct site *first;       /* the site of power-up */
     struct device_version *current; /* of device->site */
-    struct device_version *old;     /* earlier ones that are not freed yet. The thread that plans frees unused ones */
+    struct device_version *variants;
+    struct device_version *old; /* earlier ones that are not freed yet. The thread that plans frees unused ones */
     struct command_place *place, *first_place;
     _Atomic int stops; /* the run ends, and planning with it */
     struct device_move {
