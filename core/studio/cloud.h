@@ -56,15 +56,27 @@ static inline double cloud_single_unit(double v)
     return 1.2e-7 * v;
 }
 
+/* Columns beside the position. A set of columns has bit c for column c. */
 enum cloud_column {
-    CLOUD_TIME = 1,
-    CLOUD_RANGE = 2,
-    CLOUD_REFLECTANCE = 4,
-    CLOUD_ECHO_COUNT = 8,
-    CLOUD_RGB = 16,
-    CLOUD_AMPLITUDE = 32
+    CLOUD_RANGE,
+    CLOUD_REFLECTANCE,
+    CLOUD_AMPLITUDE,
+    CLOUD_TIME,
+    CLOUD_LABEL,
+    CLOUD_STATION,
+    CLOUD_ECHO,
+    CLOUD_ECHO_COUNT,
+    CLOUD_RGB,
+    CLOUD_COLUMNS
 };
-/* Reads positions, stations, echoes and labels, and these columns. SH_EINPUT names the file, and the line or byte:
+
+/* The array of a column, or NULL; *size: bytes of one value, its components together. */
+void *cloud_array(const struct cloud *cloud, enum cloud_column column, size_t *size);
+/* Makes room for n points in xyz_m and in the columns of the set `has`. The array of a column is NULL until the first
+ * call that names the column. SH_ENOMEM: the points are unchanged; some arrays may have the new room. */
+int cloud_make_room(struct cloud *cloud, size_t n, unsigned has, struct sh_err *err);
+
+/* Reads positions, stations, echoes and labels, and this set of columns. SH_EINPUT names the file, and the line or byte:
  *   the file is missing, unreadable, truncated, or not PLY or LAS; it lacks x, y or z, or counts more than it can hold;
  *   a coordinate is infinite, or only some of the three are NaN;
  *   a station, echo or label is not a whole number in its range.

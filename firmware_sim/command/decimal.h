@@ -19,7 +19,9 @@ struct command_decimal {
 const char *command_parse_decimal(const char *text, struct command_decimal *decimal);
 
 enum command_fit { COMMAND_FIT_EXACT, COMMAND_FIT_FINE, COMMAND_FIT_BIG };
-/* number * 10^shift as an integer. FINE: it has a fraction; BIG: it needs more than 63 bits. */
+/* number * 10^shift as an integer. FINE: it has a fraction; BIG: it needs more than 20 digits. */
+enum command_fit command_decimal_to_wide(const struct command_decimal *decimal, int shift, __int128 *value);
+/* The same; BIG: it needs more than 63 bits. */
 enum command_fit command_decimal_to_int(const struct command_decimal *decimal, int shift, int64_t *value);
 /* Returns the nearest double. (strtod of the text would end at a blank within the number, as in "1 E2".) */
 double command_decimal_to_double(const struct command_decimal *decimal);

@@ -145,19 +145,26 @@ const char *command_parse_decimal(const char *text, struct command_decimal *deci
     return skip_blanks(p);
 }
 
-enum command_fit command_decimal_to_int(const struct command_decimal *decimal, int shift, int64_t *value)
+enum command_fit command_decimal_to_wide(const struct command_decimal *decimal, int shift, __int128 *value)
 {
     const int zeros = decimal->exponent + shift;
     *value = 0;
     if (decimal->n_digits == 0) return COMMAND_FIT_EXACT;
     if (zeros < 0) return COMMAND_FIT_FINE;
-    if (decimal->n_digits + zeros > 19) return COMMAND_FIT_BIG;
-    uint64_t magnitude = 0; /* 19 digits: below 10^19 < 2^64 */
+    if (decimal->n_digits + zeros > 20) return COMMAND_FIT_BIG;
     for (int i = 0; i < decimal->n_digits + zeros; i++)
-        magnitude = magnitude * 10 + (i < decimal->n_digits ? (uint64_t)(decimal->digits[i] - '0') : 0);
-    if (magnitude > INT64_MAX) return COMMAND_FIT_BIG;
-    *value = decimal->negative ? -(int64_t)magnitude : (int64_t)magnitude;
+        *value = *value * 10 + (i < decimal->n_digits ? decimal->digits[i] - '0' : 0);
+    if (decimal->negative) *value = -*value;
     return COMMAND_FIT_EXACT;
+}
+
+enum command_fit command_decimal_to_int(const struct command_decimal *decimal, int shift, int64_t *value)
+{
+    __int128 wide;
+    const enum command_fit fit = command_decimal_to_wide(decimal, shift, &wide);
+    const int fits = wide >= -INT64_MAX && wide <= INT64_MAX;
+    *value = fits ? (int64_t)wide : 0;
+    return fits ? fit : COMMAND_FIT_BIG;
 }
 
 double command_decimal_to_double(const struct command_decimal *decimal)

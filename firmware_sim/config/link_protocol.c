@@ -26,8 +26,8 @@ static const unsigned ways[PROTOCOL_N] = {
 };
 
 _Static_assert((int)HEAD_MAX_RATES == (int)PROTOCOL_MAX_GEOMETRIES, "geometries");
-_Static_assert((int)EMITTER_PLANAR == (int)NATIVE_EMIT_PLANAR && (int)EMITTER_BEAMS == (int)NATIVE_EMIT_BEAMS &&
-                   (int)EMITTER_SPHERE == (int)NATIVE_EMIT_SPHERE &&
+_Static_assert((int)EMITTER_LINE == (int)NATIVE_EMIT_LINE && (int)EMITTER_PLANAR == (int)NATIVE_EMIT_PLANAR &&
+                   (int)EMITTER_BEAMS == (int)NATIVE_EMIT_BEAMS && (int)EMITTER_SPHERE == (int)NATIVE_EMIT_SPHERE &&
                    (int)EMITTER_DIRECTIONS == (int)NATIVE_EMIT_DIRECTIONS,
                "protocols name emitters as the profiles do");
 
@@ -83,25 +83,31 @@ static int has_beams(const struct protocol_ops *ops, const struct emitter *emitt
     return emitter->kind != EMITTER_BEAMS || ops->n_beams == 0 || ops->n_beams == emitter->n_beams;
 }
 
+void config_describe_emitter(const struct emitter *from, struct native_emitter *e, struct native_beam *beam)
+{
+    *e = (struct native_emitter){.kind = from->kind, /* the same numbers, as asserted above */
+                                 .n_beams = from->n_beams,
+                                 .steps = from->steps,
+                                 .first_step = (int32_t)from->first_step,
+                                 .last_step = (int32_t)from->last_step,
+                                 .front_step = (int32_t)from->front_step,
+                                 .turn = from->turn,
+                                 .sequence_ns_num = from->sequence_ticks * from->tick_num,
+                                 .sequence_ns_den = from->tick_den};
+    for (uint32_t i = 0; i < from->n_beams; i++)
+        beam[i] = (struct native_beam){(int32_t)from->beam[i].elevation_udeg, (int32_t)from->beam[i].azimuth_udeg,
+                                       from->beam[i].offset_ns};
+}
+
 /* Asks the protocol about an emitter as it asks about one of a recording: as the native frame describes it. */
 static int ask_protocol(const struct protocol_ops *ops, const struct emitter *from, double pan_counts,
                         struct sh_err *why)
 {
     const struct native_descriptor descriptor = {.pan_counts_per_turn = pan_counts};
-    struct native_emitter e = {.kind = from->kind, /* the same numbers, as asserted above */
-                               .n_beams = from->n_beams,
-                               .steps = from->steps,
-                               .first_step = (int32_t)from->first_step,
-                               .last_step = (int32_t)from->last_step,
-                               .front_step = (int32_t)from->front_step,
-                               .turn = from->turn,
-                               .sequence_ns_num = from->sequence_ticks * from->tick_num,
-                               .sequence_ns_den = from->tick_den};
+    struct native_emitter e;
     struct native_beam beam[NATIVE_MAX_BEAMS];
     uint8_t frame[NATIVE_HEADER_LEN + NATIVE_EMITTER_HEAD_LEN + NATIVE_MAX_BEAMS * NATIVE_BEAM_LEN];
-    for (uint32_t i = 0; i < from->n_beams; i++)
-        beam[i] = (struct native_beam){(int32_t)from->beam[i].elevation_udeg, (int32_t)from->beam[i].azimuth_udeg,
-                                       from->beam[i].offset_ns};
+    config_describe_emitter(from, &e, beam);
     native_encode_emitter(frame, sizeof frame, &e, beam, 0, 0);
     return ops->check_head(&descriptor, &e, frame + NATIVE_HEADER_LEN, why);
 }

@@ -12,6 +12,8 @@
 #include "firmware_sim/command/head.h"
 #include "firmware_sim/config/limits.h"
 
+struct native_beam;
+struct native_emitter;
 struct sh_err;
 
 /* Returns by how much the error of a rotor's motor makes a line rate higher, rounded to micro-hertz. */
@@ -109,6 +111,10 @@ void config_fill_spec(const struct config_profile *profile, const struct head_se
 
 /* Sets the steps of a turn of a planar head, which are those of one of its geometries. */
 void config_set_steps(struct config_profile *profile, uint32_t steps);
+
+/* Describes an emitter as its native frame does, at the profile's rate. Members that only spheres have, and the choice
+ * of echoes, become 0. beam: room for those of the emitter. */
+void config_describe_emitter(const struct emitter *emitter, struct native_emitter *e, struct native_beam *beam);
 
 /* Reads the profile NAME. The profile is looked for in $SCANHEAD_HEADS, in heads/ beside the configuration config_file,
  * beside the program (installed or in its build folder), and in config/heads of the working directory. */

@@ -32,7 +32,7 @@ static int set_up_commands(struct device *device, struct sh_err *err)
     const struct config_profile *p = &cfg->profile;
     device_set_limits(device->site, &device->cmd.limits);
     device->cmd.can_plan = device_can_plan;
-    device->cmd.owner = &device->variants;
+    device->cmd.owner = device;
     device->cmd.settings = device->cmd.defaults = cfg->head.settings;
     int len = snprintf(device->idn, sizeof device->idn, "%s,%s,%s,scanhead native %d", p->maker, p->model,
                        cfg->head.serial, NATIVE_VERSION);
@@ -95,8 +95,6 @@ static void set_parts(struct device *device)
     device->overrun.counters = &device->counters;
     device->overrun.events = &device->events;
     device->overrun.queue = &device->cmd.queue;
-    device->variants.moves = &device->moves;
-    device->variants.scan = &device->scan;
 }
 
 static void write_note(void *ctx, const struct fault_note *note)
@@ -213,7 +211,6 @@ void device_free(struct device *device)
     if (device == NULL) return;
     journal_close(device->journal.out, NULL);
     fault_board_free(device->faults);
-    device_free_variants(&device->variants);
     free(device->journal.replay);
     free(device->station_scans);
     free(device->live.sample);
@@ -300,7 +297,7 @@ int device_claim(struct device *device, struct device_work *work)
     work->t_ns = (int64_t)tick * device->tick_ns;
     replay(device, tick);
     run_faults(device, tick, work);
-    device_use_site(&device->moves, work);
+    work->version = device_use(device->moves.current);
     device_run_timers(device, tick);
     device_follow_ptp(device, tick);
     const int off = device->machine.state == HEAD_OFF;

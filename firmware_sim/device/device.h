@@ -76,7 +76,7 @@ struct device_work {
     /* The site of the scan: that of the version, or one that is planned for its settings. The site is valid until
      * device_done. */
     const struct site *site;
-    struct device_variant *variant; /* NULL: that of the version */
+    struct device_version *variant; /* NULL: that of the version */
     int64_t scan_t0_ns;             /* device time of the scan's start */
     struct schedule_segment segment;
     int64_t prr_uhz;                       /* as it is set */
@@ -146,14 +146,9 @@ void device_lost(struct device *device, const struct device_work *work);
 void device_done(struct device_work *work);
 /* Holds the site of a scan, by the scan's number, for callers that claim no ticks. NULL: it is neither the scan at hand
  * nor the last one. If stations have moved since the last scan, its site has their present places. The site is valid
- * until device_let_go, which must come before device_free, and soon after the scan's end. Takes the device's lock for a
+ * until device_give_back, which must come before device_free, and soon after the scan's end. Takes the device's lock for a
  * moment. Any thread. */
-struct device_held {
-    struct device_variant *variant;
-    struct device_version *version;
-};
-const struct site *device_hold_scan(struct device *device, uint32_t number, struct device_held *held);
-void device_let_go(struct device_held *held); /* afterwards it holds nothing: all members are 0 */
+const struct site *device_hold_scan(struct device *device, uint32_t number, struct device_version **version);
 /* True while nothing happens without a command. The pace `fast` waits then. */
 int device_is_idle(struct device *device);
 /* True where the same will be so after the next ticks, which bring events that wait. */
@@ -204,7 +199,7 @@ void device_get_station(struct device *device, uint32_t station, struct device_s
 /* Holds the present site, for callers that need more of it. The site is constant and valid until it is given back,
  * which must come before device_free, and soon: it may hold maps of hundreds of MiB. */
 const struct site *device_hold_site(struct device *device, struct device_version **version);
-void device_give_back(struct device_version *version);
+void device_give_back(struct device_version *version); /* NULL: does nothing */
 const struct site *device_site_of(const struct device_version *version);
 
 /* Stored settings of a protocol's sessions (settings_file.h). Both functions return 1 where the head keeps nothing, or

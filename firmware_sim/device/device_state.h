@@ -19,7 +19,6 @@
 #include "firmware_sim/device/ptp.h"
 #include "firmware_sim/device/scan_state.h"
 #include "firmware_sim/device/scanner_clock.h"
-#include "firmware_sim/device/variant.h"
 #include "firmware_sim/device/versions.h"
 
 /* Poses of a live platform. Each tick begins with a pose of the head. This pose is made once, from the platform's poses
@@ -122,7 +121,6 @@ struct device {
     struct fault_desk desk;
     struct head_faults head_faults; /* the board's faults in the head */
     struct device_beam beam;
-    struct device_variants variants;
 };
 
 /* ---- all with the lock held */
@@ -176,6 +174,13 @@ void device_plan_ahead(struct device *device);
 /* The two halves of device_finish_move, after planning; the second one without the lock. */
 void device_take_move(struct device *device, int64_t t_ns, struct command_result *out);
 void device_end_move(struct device *device);
+
+/* variant.c: sites that are planned again for settings that commands gave (site_vary). */
+/* Finds or plans the site for scans from a station, from 0, with these settings; NULL: the device's site will do. */
+int device_find_variant(struct device *device, const struct head_settings *settings, uint32_t station,
+                        struct device_version **out, struct sh_err *err);
+/* The same as command_device.can_plan; owner: the device. */
+int device_can_plan(void *owner, const struct head_settings *settings, char *why, size_t len);
 
 /* live_pose.c */
 /* Returns when the head's path ends the scan, since its start; INT64_MAX: no path ends it. */

@@ -48,15 +48,12 @@ void device_fill_descriptor(const struct device_scan *scan, const char *idn, uin
     if (cfg->output.attributes && cfg->waveform.echoes != WAVE_ECHOES_MODEL) d->content |= NATIVE_HAS_DEVIATIONS;
 }
 
-static const uint32_t emit[] = {[EMITTER_LINE] = NATIVE_EMIT_LINE,
-                                [EMITTER_PLANAR] = NATIVE_EMIT_PLANAR,
-                                [EMITTER_BEAMS] = NATIVE_EMIT_BEAMS,
-                                [EMITTER_SPHERE] = NATIVE_EMIT_SPHERE,
-                                [EMITTER_DIRECTIONS] = NATIVE_EMIT_DIRECTIONS};
-static const uint32_t echoes_sent[] = {[BEAM_ALL] = NATIVE_ECHOES_ALL,
-                                       [BEAM_FIRST] = NATIVE_ECHOES_FIRST,
-                                       [BEAM_LAST] = NATIVE_ECHOES_LAST,
-                                       [BEAM_STRONGEST] = NATIVE_ECHOES_STRONGEST};
+_Static_assert((int)BEAM_ALL == (int)NATIVE_ECHOES_ALL && (int)BEAM_FIRST == (int)NATIVE_ECHOES_FIRST &&
+                   (int)BEAM_LAST == (int)NATIVE_ECHOES_LAST && (int)BEAM_STRONGEST == (int)NATIVE_ECHOES_STRONGEST,
+               "the stream numbers choices of echoes as heads do");
+_Static_assert((int)GEOREF_LOCAL == (int)NATIVE_CRS_LOCAL && (int)GEOREF_ECEF == (int)NATIVE_CRS_ECEF &&
+                   (int)GEOREF_UTM == (int)NATIVE_CRS_UTM && (int)GEOREF_GEODETIC == (int)NATIVE_CRS_GEODETIC,
+               "the stream numbers coordinate reference systems as configurations do");
 
 /* Uses the rate that is set: with a slow mirror the segment has another one. */
 static void set_sequence(const struct device_scan *scan, struct native_emitter *e)
@@ -75,36 +72,24 @@ void device_fill_emitter(const struct device_scan *scan, uint32_t echoes, struct
     const struct emitter *from = scan->segment.spec.emitter;
     memset(e, 0, sizeof *e);
     if (from == NULL) return;
-    *e = (struct native_emitter){.kind = emit[from->kind],
-                                 .n_beams = from->n_beams,
-                                 .steps = from->steps,
-                                 .first_step = (int32_t)from->first_step,
-                                 .last_step = (int32_t)from->last_step,
-                                 .front_step = (int32_t)scan->segment.front_step,
-                                 .turn = from->turn,
-                                 .rings = from->rings,
-                                 .echoes = echoes_sent[echoes]};
+    config_describe_emitter(from, e, beam);
+    e->front_step = (int32_t)scan->segment.front_step;
+    e->rings = from->rings;
+    e->echoes = echoes;
     set_sequence(scan, e);
     if (from->kind == EMITTER_SPHERE) {
         e->first_ring_udeg = llround(360e6 * emitter_ring_turn(from, 0));
         e->gaps = from->rings != from->gaps + 1 ? from->gaps : 0;
     }
-    for (uint32_t i = 0; i < from->n_beams; i++)
-        beam[i] = (struct native_beam){(int32_t)from->beam[i].elevation_udeg, (int32_t)from->beam[i].azimuth_udeg,
-                                       from->beam[i].offset_ns};
 }
 
 void device_fill_anchor(const struct site *site, uint32_t station, size_t stretch, struct native_anchor *a)
 {
-    static const uint32_t crs[] = {[GEOREF_LOCAL] = NATIVE_CRS_LOCAL,
-                                   [GEOREF_ECEF] = NATIVE_CRS_ECEF,
-                                   [GEOREF_UTM] = NATIVE_CRS_UTM,
-                                   [GEOREF_GEODETIC] = NATIVE_CRS_GEODETIC};
     const struct site_station *s = &site->station[station];
     const double *centre_m, *scale;
     const struct georef *georef = site_georef(site, station, stretch, &centre_m, &scale);
     memset(a, 0, sizeof *a);
-    a->crs = crs[site->cfg->output.crs];
+    a->crs = site->cfg->output.crs;
     a->epsg = (uint32_t)georef_epsg(georef);
     a->station = station + 1;
     georef_anchor(georef, a->anchor);

@@ -39,16 +39,6 @@ static void say_gap(char text[LINE_GAP_BYTES], const uint64_t lost[LINE_KINDS])
 }
 
 /* The first line shows whether the file can be written at all, before anything runs. */
-static int write_title(int fd)
-{
-    for (size_t done = 0; done < sizeof title - 1;) { /* after a short write, the next one has the reason */
-        const ssize_t n = write(fd, title + done, sizeof title - 1 - done);
-        if (n < 0 && errno != EINTR) return errno;
-        if (n > 0) done += (size_t)n;
-    }
-    return 0;
-}
-
 struct journal *journal_open(const char *path, _Atomic uint64_t *lost, struct sh_err *err)
 {
     struct sh_err why = {0};
@@ -57,7 +47,7 @@ struct journal *journal_open(const char *path, _Atomic uint64_t *lost, struct sh
         sh_fail(err, rc, "journal: %s", why.text);
         return NULL;
     }
-    const int error = write_title(fd);
+    const int error = dprintf(fd, "%s", title) < 0 ? errno : 0;
     struct journal *journal = error == 0 ? calloc(1, sizeof *journal) : NULL;
     if (journal == NULL) {
         close(fd);

@@ -98,7 +98,7 @@ void device_plan_move(struct device *device)
 {
     struct device_moves *moves = &device->moves;
     moves->err = (struct sh_err){0, ""};
-    device_free_unused_sites(moves);
+    device_free_unused(&moves->old, NULL);
     if (moves->plan.stays) return;
     if (moves->ahead != NULL && !is_next(moves)) device_free_versions(&moves->ahead);
     moves->made = moves->ahead;
@@ -161,10 +161,10 @@ static void use(struct device *device, struct device_version *version)
 static void move_last_scan(struct device *device)
 {
     struct device_scan *scan = &device->scan;
-    struct device_variant *variant = NULL;
+    struct device_version *variant = NULL;
     struct sh_err err;
     if (scan->variant != NULL &&
-        device_find_variant(&device->variants, &scan->variant->settings, scan->station, &variant, &err) != SH_OK)
+        device_find_variant(device, &scan->variant->settings, scan->station, &variant, &err) != SH_OK)
         variant = NULL;
     scan->variant = variant;
     scan->site = variant != NULL ? variant->site : device->site;
@@ -179,9 +179,9 @@ static int swap(struct device *device, struct sh_err *err)
     struct device_moves *moves = &device->moves;
     struct device_version *was = moves->current;
     const struct head_settings *now = &device->cmd.settings;
-    struct device_variant *variant;
+    struct device_version *variant;
     use(device, moves->made);
-    int rc = device_find_variant(&device->variants, now, now->station - 1, &variant, err);
+    int rc = device_find_variant(device, now, now->station - 1, &variant, err);
     if (rc != SH_OK) {
         use(device, was);
         return rc;
@@ -191,7 +191,7 @@ static int swap(struct device *device, struct sh_err *err)
     moves->old = was;
     device_set_places(device->site, moves->place);
     move_last_scan(device);
-    device_free_unused_variants(&device->variants); /* these hold the earlier site */
+    device_free_unused(&moves->variants, device->scan.variant); /* these hold the earlier site */
     return SH_OK;
 }
 
@@ -237,7 +237,7 @@ void device_take_move(struct device *device, int64_t t_ns, struct command_result
 
 void device_end_move(struct device *device)
 {
-    device_free_unused_sites(&device->moves);
+    device_free_unused(&device->moves.old, NULL);
     pthread_mutex_lock(&device->lock);
     device->cmd.moving = 0;
     pthread_mutex_unlock(&device->lock);
@@ -256,32 +256,21 @@ void device_finish_move(struct device *device, uint64_t released, struct command
 const struct site *device_hold_site(struct device *device, struct device_version **version)
 {
     pthread_mutex_lock(&device->lock);
-    *version = device->moves.current;
-    atomic_fetch_add(&(*version)->users, 1);
+    *version = device_use(device->moves.current);
     pthread_mutex_unlock(&device->lock);
     return (*version)->site;
 }
 
-const struct site *device_hold_scan(struct device *device, uint32_t number, struct device_held *held)
+const struct site *device_hold_scan(struct device *device, uint32_t number, struct device_version **version)
 {
-    const struct site *site = NULL;
-    *held = (struct device_held){NULL, NULL};
     pthread_mutex_lock(&device->lock);
-    struct device_version *now = device->moves.current;
-    if (device->scan.number == number) {
-        held->variant = device->scan.variant;
-        if (held->variant == NULL && device->scan.site == now->site) held->version = now;
-    }
-    if (held->variant != NULL) {
-        atomic_fetch_add(&held->variant->users, 1);
-        site = held->variant->site;
-    }
-    if (held->version != NULL) {
-        atomic_fetch_add(&held->version->users, 1);
-        site = held->version->site;
-    }
+    const struct device_scan *scan = &device->scan;
+    *version = scan->variant;
+    if (*version == NULL && scan->site == device->moves.current->site) *version = device->moves.current;
+    if (scan->number != number) *version = NULL;
+    device_use(*version);
     pthread_mutex_unlock(&device->lock);
-    return site;
+    return *version != NULL ? (*version)->site : NULL;
 }
 
 void device_get_station(struct device *device, uint32_t station, struct device_station *out)

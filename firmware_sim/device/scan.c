@@ -10,11 +10,11 @@
 
 /* Plans the site for the settings. The plan may fail although each setting was accepted: without memory, or because the
  * scan begins at another station. */
-static int plan_scan(struct device *device, struct device_variant **variant, uint64_t tick)
+static int plan_scan(struct device *device, struct device_version **variant, uint64_t tick)
 {
     const struct head_settings *settings = &device->cmd.settings;
     struct sh_err err;
-    if (device_find_variant(&device->variants, settings, settings->station - 1, variant, &err) == SH_OK) return 1;
+    if (device_find_variant(device, settings, settings->station - 1, variant, &err) == SH_OK) return 1;
     command_queue_push(&device->cmd.queue, CMD_E_SETTINGS, err.text);
     device_push_error(&device->events, 0, CMD_E_SETTINGS, err.text);
     device_transition(device, HEAD_EV_FAIL, tick);
@@ -34,7 +34,7 @@ void device_count_duration(struct device *device, uint64_t tick)
 void device_begin_scan(struct device *device, uint64_t tick)
 {
     struct schedule_spec spec;
-    struct device_variant *variant;
+    struct device_version *variant;
     if (!plan_scan(device, &variant, tick)) return;
     const struct site *site = variant != NULL ? variant->site : device->site;
     device->scan = (struct device_scan){.on = 1,
@@ -134,8 +134,7 @@ static int claim_pulses(struct device *device, uint64_t tick, struct device_work
     int stop = device->scan.stop_requested || device->ending || tick >= device->end_tick;
     work->scanning = 1;
     work->site = device->scan.site;
-    work->variant = device->scan.variant;
-    if (work->variant != NULL) atomic_fetch_add(&work->variant->users, 1);
+    work->variant = device_use(device->scan.variant);
     work->scan_t0_ns = (int64_t)device->scan.tick0 * device->tick_ns;
     work->station = device->scan.station;
     work->station_scan = device->scan.station_scan;
@@ -194,8 +193,7 @@ void device_before_scans(struct device *device)
     device_end_beam(&device->beam, 0);
     scan->settings = *settings;
     scan->station = settings->station - 1;
-    if (device_find_variant(&device->variants, settings, scan->station, &scan->variant, &err) != SH_OK)
-        scan->variant = NULL;
+    if (device_find_variant(device, settings, scan->station, &scan->variant, &err) != SH_OK) scan->variant = NULL;
     scan->site = scan->variant != NULL ? scan->variant->site : device->site;
     device_fill_spec(&device->beam, scan->site, &spec);
     schedule_start(&scan->segment, &spec);

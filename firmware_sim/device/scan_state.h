@@ -9,13 +9,13 @@
 #include "core/schedule.h"
 #include "firmware_sim/command/head.h"
 
-struct device_variant;
+struct device_version;
 struct site;
 
 struct device_scan {
     int on;
     const struct site *site;        /* that the scan is made with */
-    struct device_variant *variant; /* NULL: site is the device's */
+    struct device_version *variant; /* NULL: site is the device's */
     uint32_t number;                /* from 1 */
     uint64_t tick0;                 /* its first */
     uint64_t end_tick;              /* the first tick after it, when no scan is on */

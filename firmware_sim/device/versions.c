@@ -3,7 +3,6 @@
 #include <stdlib.h>
 
 #include "firmware_sim/config/places.h"
-#include "firmware_sim/device/variant.h"
 #include "firmware_sim/device/versions.h"
 
 struct device_version *device_make_version(const struct site *site, struct site *own)
@@ -18,7 +17,11 @@ struct device_version *device_make_version(const struct site *site, struct site 
 void device_free_version(struct device_version *version)
 {
     if (version == NULL) return;
-    site_free(version->own);
+    if (version->from != NULL)
+        site_vary_free(version->own);
+    else
+        site_free(version->own);
+    device_give_back(version->from);
     free(version);
 }
 
@@ -31,13 +34,12 @@ void device_free_versions(struct device_version **list)
     }
 }
 
-/* Frees earlier sites that nobody uses. The first site belongs to its owner: only its maps are freed. */
-void device_free_unused_sites(struct device_moves *moves)
+/* The first site belongs to its owner: only its maps are freed. */
+void device_free_unused(struct device_version **at, const struct device_version *kept)
 {
-    struct device_version **at = &moves->old;
     while (*at != NULL) {
         struct device_version *version = *at;
-        if (atomic_load(&version->users) != 0) {
+        if (version == kept || atomic_load(&version->users) != 0) {
             at = &version->next;
             continue;
         }
@@ -47,16 +49,15 @@ void device_free_unused_sites(struct device_moves *moves)
     }
 }
 
-void device_use_site(struct device_moves *moves, struct device_work *work)
+struct device_version *device_use(struct device_version *version)
 {
-    struct device_version *version = moves->current;
-    atomic_fetch_add(&version->users, 1);
-    work->version = version;
+    if (version != NULL) atomic_fetch_add(&version->users, 1);
+    return version;
 }
 
 void device_done(struct device_work *work)
 {
-    if (work->variant != NULL) atomic_fetch_sub(&work->variant->users, 1);
+    device_give_back(work->variant);
     device_give_back(work->version);
     work->variant = NULL;
     work->version = NULL;
@@ -103,6 +104,7 @@ int device_open_moves(struct device_moves *moves, const struct site *site, struc
 
 void device_close_moves(struct device_moves *moves)
 {
+    device_free_versions(&moves->variants);
     device_free_versions(&moves->old);
     device_free_versions(&moves->ahead);
     device_free_version(moves->made);

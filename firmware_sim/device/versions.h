@@ -11,12 +11,16 @@
 #include "firmware_sim/device/device.h"
 #include "firmware_sim/site/site.h"
 
-/* A site that is kept while it is in use: by the device, and by ticks that were claimed while it was the device's. */
+/* A site that is kept while it is in use: by the device, and by ticks that were claimed while it was the device's. Or a
+ * variant (variant.c), kept while a scan or a tick's work uses it. */
 struct device_version {
     const struct site *site;
     struct site *own;       /* the site, which is freed with the version; NULL: device_create's caller frees it */
     _Atomic uint32_t users; /* not counting the device */
     struct device_version *next;
+    struct device_version *from;   /* the version that a variant is made from, and uses; else NULL */
+    struct head_settings settings; /* of a variant */
+    uint32_t station;              /* of a variant, from 0 */
 };
 
 /* Stations that are moved, one at a time (moves.c). plan, made, ahead and err belong to the thread that plans, without
@@ -24,7 +28,8 @@ struct device_version {
 struct device_moves {
     const struct site *first;       /* the site of power-up */
     struct device_version *current; /* of device->site */
-    struct device_version *old;     /* earlier ones that are not freed yet */
+    struct device_version *variants;
+    struct device_version *old; /* earlier ones that are not freed yet. The thread that plans frees unused ones */
     struct command_place *place, *first_place;
     _Atomic int stops; /* the run ends, and planning with it */
     struct device_move {
@@ -44,12 +49,12 @@ struct device_moves {
 struct device_version *device_make_version(const struct site *site, struct site *own);
 void device_free_version(struct device_version *version);
 void device_free_versions(struct device_version **list);
-/* Frees earlier versions that nobody uses. The thread that plans moves calls this, without the lock. */
-void device_free_unused_sites(struct device_moves *moves);
+/* Frees the versions of a list that nobody uses, except one. */
+void device_free_unused(struct device_version **at, const struct device_version *kept);
+/* Counts one more user, until device_give_back. Returns the version, which may be NULL. */
+struct device_version *device_use(struct device_version *version);
 void device_set_places(const struct site *site, struct command_place *place);
 int device_open_moves(struct device_moves *moves, const struct site *site, struct sh_err *err);
 void device_close_moves(struct device_moves *moves);
-/* Makes the work's tick hold the present site. */
-void device_use_site(struct device_moves *moves, struct device_work *work);
 
 #endif

@@ -64,13 +64,8 @@ void replay_take_descriptor(struct replay *r, const struct native_descriptor *d)
 
 void replay_take_emitter(struct replay *r, const struct native_emitter *e)
 {
-    static const enum emitter_kind kinds[] = {[NATIVE_EMIT_LINE] = EMITTER_LINE,
-                                              [NATIVE_EMIT_PLANAR] = EMITTER_PLANAR,
-                                              [NATIVE_EMIT_BEAMS] = EMITTER_BEAMS,
-                                              [NATIVE_EMIT_SPHERE] = EMITTER_SPHERE,
-                                              [NATIVE_EMIT_DIRECTIONS] = EMITTER_DIRECTIONS};
     struct command_device *cmd = &r->cmd;
-    if (e->kind < sizeof kinds / sizeof *kinds) cmd->limits.emitter = kinds[e->kind];
+    cmd->limits.emitter = (enum emitter_kind)e->kind; /* the same numbers (config/link_protocol.c) */
     cmd->limits.line_pulses = e->steps;
     cmd->limits.step_fixed = 1;
     cmd->settings.echoes = e->echoes <= NATIVE_ECHOES_STRONGEST ? e->echoes : COMMAND_NOT_RECORDED_U32;

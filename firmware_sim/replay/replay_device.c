@@ -37,15 +37,10 @@ static const char *lacks(const struct replay *r, const struct protocol_ops *ops,
 static int check_emitter(const struct protocol_ops *ops, const struct native_descriptor *d,
                          const struct native_emitter *e, const uint8_t *beams, struct sh_err *err)
 {
-    static const char *const kinds[] = {[NATIVE_EMIT_LINE] = "line",
-                                        [NATIVE_EMIT_PLANAR] = "planar",
-                                        [NATIVE_EMIT_BEAMS] = "beams",
-                                        [NATIVE_EMIT_SPHERE] = "sphere",
-                                        [NATIVE_EMIT_DIRECTIONS] = "directions"};
     const uint32_t kind = e != NULL ? e->kind : (uint32_t)NATIVE_EMIT_LINE;
     if (ops->emitters != 0 && (ops->emitters & 1u << kind) == 0)
-        return sh_fail(err, SH_EINPUT, "emitter %s; allowed is %s", kinds[kind],
-                       kinds[(ops->emitters & 1u << NATIVE_EMIT_PLANAR) != 0 ? NATIVE_EMIT_PLANAR : NATIVE_EMIT_BEAMS]);
+        return sh_fail(err, SH_EINPUT, "emitter %s; allowed is %s", emitter_names[kind],
+                       emitter_names[(ops->emitters & 1u << EMITTER_PLANAR) != 0 ? EMITTER_PLANAR : EMITTER_BEAMS]);
     if (kind == NATIVE_EMIT_BEAMS && ops->n_beams != 0 && e->n_beams != ops->n_beams)
         return sh_fail(err, SH_EINPUT, "%u rings; allowed are %u", e->n_beams, ops->n_beams);
     return ops->check_head != NULL && e != NULL ? ops->check_head(d, e, beams, err) : SH_OK;

@@ -166,7 +166,7 @@ static void columns_are_read_where_asked_for(void **state)
     assert_true(c.time_s == NULL && c.range_m == NULL && c.reflectance_db == NULL && c.echo_count == NULL);
     cloud_free(&c);
     struct sh_err err;
-    const unsigned all = CLOUD_TIME | CLOUD_RANGE | CLOUD_REFLECTANCE | CLOUD_ECHO_COUNT;
+    const unsigned all = 1u << CLOUD_TIME | 1u << CLOUD_RANGE | 1u << CLOUD_REFLECTANCE | 1u << CLOUD_ECHO_COUNT;
     assert_int_equal(cloud_read_columns(write_file("columns.ply", text, sizeof text - 1), all, &report, &c, &err),
                      SH_OK);
     unlink(path);

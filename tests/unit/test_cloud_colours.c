@@ -9,8 +9,8 @@ static struct cloud read_cloud(const char *name, const void *data, size_t len)
 {
     struct cloud c;
     struct sh_err err = {0, ""};
-    if (cloud_read_columns(write_file(name, data, len), CLOUD_RANGE | CLOUD_REFLECTANCE | CLOUD_RGB, NULL, &c, &err) !=
-        SH_OK)
+    if (cloud_read_columns(write_file(name, data, len), 1u << CLOUD_RANGE | 1u << CLOUD_REFLECTANCE | 1u << CLOUD_RGB,
+                           NULL, &c, &err) != SH_OK)
         fail_msg("%s", err.text);
     unlink(path);
     return c;

@@ -12,7 +12,7 @@ enum {
     VLR = 54,
     EXTRA = 192,
     N = 2,
-    ALL = CLOUD_TIME | CLOUD_RGB | CLOUD_ECHO_COUNT
+    ALL = 1 << CLOUD_TIME | 1 << CLOUD_RGB | 1 << CLOUD_ECHO_COUNT
 };
 
 /* Lengths of records, and where GPS time and the colours are; 0: the format has none. */
@@ -79,8 +79,8 @@ static void make(struct made *m, unsigned of, const uint8_t (*entry)[EXTRA], siz
 
 static int read_made(const struct made *m, struct cloud *cloud)
 {
-    const int rc = cloud_read_columns(write_file("a.las", m->byte, m->points_at + N * m->len), ALL | CLOUD_REFLECTANCE,
-                                      NULL, cloud, &err);
+    const int rc = cloud_read_columns(write_file("a.las", m->byte, m->points_at + N * m->len),
+                                      ALL | 1u << CLOUD_REFLECTANCE, NULL, cloud, &err);
     unlink(path);
     return rc;
 }

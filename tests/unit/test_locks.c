@@ -70,7 +70,6 @@ static void a_move_is_locked(void **state)
     struct device *d = rig->device;
     struct command_result result;
     struct device_version *version;
-    struct device_held held;
     rig_go_to(rig, 230);
     TAKES(1, (device_command(d, 1, "SITE:POSE 1, 0.1,0,0,0,0,0", rig->next, &result), 0));
     assert_int_equal(result.effect, COMMAND_MOVE);
@@ -78,8 +77,8 @@ static void a_move_is_locked(void **state)
     TAKES(2, (device_finish_move(d, rig->next, &result), 0)); /* it is taken, and it ends */
     TAKES(1, device_hold_site(d, &version));
     device_give_back(version);
-    TAKES(1, device_hold_scan(d, 1, &held));
-    device_let_go(&held);
+    TAKES(1, device_hold_scan(d, 1, &version));
+    device_give_back(version);
     rig_close(rig);
 }
 

@@ -239,20 +239,20 @@ static void who_asks_holds_the_site_of_a_scan(void **state)
 {
     (void)state;
     static const char *const sets[] = {SHORT};
-    struct device_held held;
+    struct device_version *held;
     struct rig *rig = rig_idle(NULL, sets, 2);
     struct bytes b = scan(rig);
     const uint32_t number = rig->device->scan.number;
     assert_null(device_hold_scan(rig->device, number + 1, &held));
-    assert_true(held.variant == NULL && held.version == NULL);
+    assert_true(held == NULL);
     const struct site *site = device_hold_scan(rig->device, number, &held);
     assert_true(site != NULL && site->station[0].at.position_m[2] == 0.0);
-    assert_true((held.variant != NULL) != (held.version != NULL));
+    assert_non_null(held);
     rig_go_to(rig, rig->next + 100);
     expect_moved(rig, "SITE:POSE 1, 0,0,0.5,0,0,0");
     expect_moved(rig, "SITE:POSE 1, 0,0,0.25,0,0,0");
     assert_true(site->station[0].at.position_m[2] == 0.0);
-    device_let_go(&held);
+    device_give_back(held);
     free(b.at);
     rig_close(rig);
 }

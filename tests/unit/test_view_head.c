@@ -78,10 +78,10 @@ static void each_key_of_a_turned_recording(void **state)
                        .origin_m = {7, 8, 9},
                        .t0_s = 10.5};
     (void)state;
-    v.low[VIEWED_LABEL] = 3;
-    v.high[VIEWED_LABEL] = 4;
-    v.low[VIEWED_ECHO] = 1;
-    v.high[VIEWED_ECHO] = 2;
+    v.low[CLOUD_LABEL] = 3;
+    v.high[CLOUD_LABEL] = 4;
+    v.low[CLOUD_ECHO] = 1;
+    v.high[CLOUD_ECHO] = 2;
     expect_in_order(
         &v,
         (const char *const[]){

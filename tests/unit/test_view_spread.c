@@ -47,10 +47,10 @@ static int fill(void **state)
 {
     (void)state;
     const unsigned has =
-        1u << VIEWED_RANGE | 1u << VIEWED_REFLECTANCE | 1u << VIEWED_LABEL | 1u << VIEWED_STATION | 1u << VIEWED_RGB;
+        1u << CLOUD_RANGE | 1u << CLOUD_REFLECTANCE | 1u << CLOUD_LABEL | 1u << CLOUD_STATION | 1u << CLOUD_RGB;
     memset(&v, 0, sizeof v);
     v.path = "a.shs";
-    if (viewed_points_room(&v.points, N, has, &err) != SH_OK) return -1;
+    if (cloud_make_room(&v.points, N, has, &err) != SH_OK) return -1;
     v.points.n = N;
     for (int i = 0; i < N; i++) {
         memcpy(v.points.xyz_m[i], places[i], sizeof places[i]);

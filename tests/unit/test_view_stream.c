@@ -109,15 +109,15 @@ static void each_point_has_its_columns(void **state)
     near(shown.min_m[1], 5e6);
     near(shown.max_m[2], 398.125);
     near(shown.origin_m[0], 500002.0); /* the middle, to a metre */
-    near(shown.low[VIEWED_REFLECTANCE], -3.0);
-    near(shown.high[VIEWED_REFLECTANCE], 0.5);
-    near(shown.low[VIEWED_LABEL], 7.0);
-    near(shown.high[VIEWED_ECHO], 2.0);
-    near(shown.high[VIEWED_ECHOES], 2.0);
-    near(shown.low[VIEWED_STATION], 3.0);
-    near(shown.high[VIEWED_T], 0.012);
+    near(shown.low[CLOUD_REFLECTANCE], -3.0);
+    near(shown.high[CLOUD_REFLECTANCE], 0.5);
+    near(shown.low[CLOUD_LABEL], 7.0);
+    near(shown.high[CLOUD_ECHO], 2.0);
+    near(shown.high[CLOUD_ECHO_COUNT], 2.0);
+    near(shown.low[CLOUD_STATION], 3.0);
+    near(shown.high[CLOUD_TIME], 0.012);
     near(shown.t0_s, 0.0);
-    assert_true(isnan(shown.low[VIEWED_AMPLITUDE]) && isnan(shown.high[VIEWED_AMPLITUDE]));
+    assert_true(isnan(shown.low[CLOUD_AMPLITUDE]) && isnan(shown.high[CLOUD_AMPLITUDE]));
     /* The scan has no end in this stream. */
     assert_int_equal(shown.complete, 0);
     assert_non_null(strstr(rig_notes,

@@ -86,17 +86,17 @@ static void a_ply_with_all_columns(void **state)
     assert_int_equal(v.points.label[1], CLOUD_LABEL_NONE);
     assert_int_equal(v.points.rgb[1][2], 3);
     assert_true(v.points.xyz_m[1][2] == -1);
-    assert_null(viewed_array(&v.points, VIEWED_REFLECTANCE, &size));
-    assert_true(v.low[VIEWED_AMPLITUDE] == 20 && v.high[VIEWED_AMPLITUDE] == 30.5);
+    assert_null(cloud_array(&v.points, CLOUD_REFLECTANCE, &size));
+    assert_true(v.low[CLOUD_AMPLITUDE] == 20 && v.high[CLOUD_AMPLITUDE] == 30.5);
     assert_true(v.min_m[1] == 2 && v.max_m[1] == 6 && v.min_m[2] == -1 && v.max_m[2] == 3);
     assert_true(v.origin_m[0] == 2 && v.origin_m[1] == 4 && v.origin_m[2] == 1); /* the middle */
-    assert_true(v.t0_s == 10.5 && v.high[VIEWED_T] == 12.5);
-    assert_true(v.low[VIEWED_LABEL] == 3 && v.high[VIEWED_LABEL] == 3);
-    assert_true(v.low[VIEWED_RANGE] == 5 && v.high[VIEWED_RANGE] == 8);
-    assert_true(v.low[VIEWED_STATION] == 7 && v.high[VIEWED_STATION] == 9);
-    assert_true(v.low[VIEWED_ECHO] == 1 && v.high[VIEWED_ECHO] == 2);
-    assert_true(v.low[VIEWED_ECHOES] == 2 && v.high[VIEWED_ECHOES] == 2);
-    assert_true(isnan(v.low[VIEWED_RGB]) && isnan(v.high[VIEWED_REFLECTANCE]));
+    assert_true(v.t0_s == 10.5 && v.high[CLOUD_TIME] == 12.5);
+    assert_true(v.low[CLOUD_LABEL] == 3 && v.high[CLOUD_LABEL] == 3);
+    assert_true(v.low[CLOUD_RANGE] == 5 && v.high[CLOUD_RANGE] == 8);
+    assert_true(v.low[CLOUD_STATION] == 7 && v.high[CLOUD_STATION] == 9);
+    assert_true(v.low[CLOUD_ECHO] == 1 && v.high[CLOUD_ECHO] == 2);
+    assert_true(v.low[CLOUD_ECHO_COUNT] == 2 && v.high[CLOUD_ECHO_COUNT] == 2);
+    assert_true(isnan(v.low[CLOUD_RGB]) && isnan(v.high[CLOUD_REFLECTANCE]));
     assert_string_equal(v.why_no_mesh, "a .ply holds points without the scan's grid; meshes are shown of a .shs");
     assert_string_equal(v.idn, "Maker,Model,17,x");
     assert_string_equal(v.profile, "sphere");
@@ -158,7 +158,7 @@ enum { N = 5 };
 static void fill(struct cloud *p)
 {
     memset(p, 0, sizeof *p);
-    assert_int_equal(viewed_points_room(p, N, 1u << VIEWED_T | 1u << VIEWED_STATION | 1u << VIEWED_RGB, &err), SH_OK);
+    assert_int_equal(cloud_make_room(p, N, 1u << CLOUD_TIME | 1u << CLOUD_STATION | 1u << CLOUD_RGB, &err), SH_OK);
     p->n = N;
     for (int i = 0; i < N; i++) {
         p->xyz_m[i][0] = 500000 + i;

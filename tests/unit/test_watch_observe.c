@@ -225,8 +225,7 @@ static void a_scan_is_judged_as_by_the_report(void **state)
         same("lost", number(quality, "{", "lost_frames"), 0, 0);
         assert_true(number(quality, "\"coverage\"", "share") > 0);
         free(quality);
-        assert_true(w->now_georef == NULL && w->held.variant == NULL &&
-                    w->held.version == NULL); /* all is given back */
+        assert_true(w->now_georef == NULL && w->held == NULL); /* all is given back */
         close_watch();
     }
 }
@@ -265,7 +264,7 @@ static void telemetry_ends_a_scan(void **state)
         char *quality = observed();
         expect_counts(quality, "{\"scan\":1,\"station\":1,", POINTS, SHOTS, rows[i].over);
         free(quality);
-        assert_true(w->held.variant == NULL && w->held.version == NULL); /* the stream's end gives it back, too */
+        assert_true(w->held == NULL); /* the stream's end gives it back, too */
         close_watch();
     }
 }

@@ -1,44 +1,45 @@
 /* SPDX-License-Identifier: MIT */
-/* The memory of a cloud, and the choice of its reader. */
+/* The memory of a cloud, its columns by number, and the choice of its reader. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "core/studio/analysis/cloud_readers.h"
+#include "core/grow.h"
 #include "core/infile.h"
 #include "core/text.h"
 
-static int reserve_one(void *array, size_t n, size_t size)
+#define COLUMN(member) offsetof(struct cloud, member), sizeof *((struct cloud *)0)->member
+
+/* Where the pointer of a column lies, and the bytes of a value. */
+static const struct {
+    size_t at, size;
+} arrays[CLOUD_COLUMNS] = {
+    [CLOUD_RANGE] = {COLUMN(range_m)},
+    [CLOUD_REFLECTANCE] = {COLUMN(reflectance_db)},
+    [CLOUD_AMPLITUDE] = {COLUMN(amplitude_db)},
+    [CLOUD_TIME] = {COLUMN(time_s)},
+    [CLOUD_LABEL] = {COLUMN(label)},
+    [CLOUD_STATION] = {COLUMN(station)},
+    [CLOUD_ECHO] = {COLUMN(echo)},
+    [CLOUD_ECHO_COUNT] = {COLUMN(echo_count)},
+    [CLOUD_RGB] = {COLUMN(rgb)},
+};
+
+void *cloud_array(const struct cloud *cloud, enum cloud_column column, size_t *size)
 {
-    void *made = calloc(n, size);
-    memcpy(array, &made, sizeof made); /* a pointer of any type */
-    return made != NULL;
+    void *array;
+    *size = arrays[column].size;
+    memcpy(&array, (const char *)cloud + arrays[column].at, sizeof array); /* a pointer of any type */
+    return array;
 }
 
-int cloud_reserve(struct cloud *cloud, size_t n, unsigned has, struct sh_err *err)
+int cloud_make_room(struct cloud *cloud, size_t n, unsigned has, struct sh_err *err)
 {
-    if (n == 0) return SH_OK;
-    const struct {
-        unsigned bit;
-        void *array;
-        size_t size;
-    } column[] = {
-        {CLOUD_HAS_STATION, &cloud->station, sizeof *cloud->station},
-        {CLOUD_HAS_LABEL, &cloud->label, sizeof *cloud->label},
-        {CLOUD_HAS_ECHO, &cloud->echo, sizeof *cloud->echo},
-        {CLOUD_TIME, &cloud->time_s, sizeof *cloud->time_s},
-        {CLOUD_RANGE, &cloud->range_m, sizeof *cloud->range_m},
-        {CLOUD_REFLECTANCE, &cloud->reflectance_db, sizeof *cloud->reflectance_db},
-        {CLOUD_AMPLITUDE, &cloud->amplitude_db, sizeof *cloud->amplitude_db},
-        {CLOUD_RGB, &cloud->rgb, sizeof *cloud->rgb},
-        {CLOUD_ECHO_COUNT, &cloud->echo_count, sizeof *cloud->echo_count},
-    };
-    int ok = reserve_one(&cloud->xyz_m, n, sizeof *cloud->xyz_m);
-    for (size_t i = 0; i < sizeof column / sizeof column[0] && ok; i++)
-        if (has & column[i].bit) ok = reserve_one(column[i].array, n, column[i].size);
-    if (!ok) return sh_fail(err, SH_ENOMEM, "no memory for %zu points", n);
-    cloud->n = n;
-    return SH_OK;
+    bool ok = resize(&cloud->xyz_m, n, sizeof *cloud->xyz_m);
+    for (int c = 0; c < CLOUD_COLUMNS && ok; c++)
+        if ((has >> c & 1u) != 0) ok = resize((char *)cloud + arrays[c].at, n, arrays[c].size);
+    return ok ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory for %zu points", n);
 }
 
 void cloud_note_single(struct cloud *cloud, const char *path, const struct sh_report *report)
@@ -94,15 +95,9 @@ int cloud_read_positions(const char *path, const struct sh_report *report, struc
 
 void cloud_free(struct cloud *cloud)
 {
+    size_t size;
     free(cloud->xyz_m);
-    free(cloud->station);
-    free(cloud->label);
-    free(cloud->echo);
-    free(cloud->time_s);
-    free(cloud->range_m);
-    free(cloud->reflectance_db);
-    free(cloud->amplitude_db);
-    free(cloud->echo_count);
-    free(cloud->rgb);
+    for (int c = 0; c < CLOUD_COLUMNS; c++)
+        free(cloud_array(cloud, (enum cloud_column)c, &size));
     *cloud = (struct cloud){.epsg = CLOUD_EPSG_UNKNOWN};
 }

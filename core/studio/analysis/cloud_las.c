@@ -145,11 +145,11 @@ static int is_ours(const struct las *las)
 /* Returns the columns that are asked for and that the file has. */
 static unsigned columns_of(const struct las *las, unsigned asked)
 {
-    unsigned has = CLOUD_ECHO_COUNT;
-    if (time_at[las->format] != 0) has |= CLOUD_TIME;
-    if (colours_at[las->format] != 0) has |= CLOUD_RGB;
-    if (is_ours(las)) has |= CLOUD_REFLECTANCE;
-    return (asked & has) | CLOUD_HAS_STATION | CLOUD_HAS_ECHO | (las->label_at >= 0 ? CLOUD_HAS_LABEL : 0);
+    unsigned has = 1u << CLOUD_ECHO_COUNT;
+    if (time_at[las->format] != 0) has |= 1u << CLOUD_TIME;
+    if (colours_at[las->format] != 0) has |= 1u << CLOUD_RGB;
+    if (is_ours(las)) has |= 1u << CLOUD_REFLECTANCE;
+    return (asked & has) | 1u << CLOUD_STATION | 1u << CLOUD_ECHO | (las->label_at >= 0 ? 1u << CLOUD_LABEL : 0);
 }
 
 static double count_m(const struct las *las)
@@ -234,8 +234,9 @@ int cloud_read_las(const char *path, unsigned columns, const struct sh_report *r
     las.data = (const uint8_t *)las.t.data;
     if (rc == SH_OK) rc = read_header(&las, err);
     if (rc == SH_OK) rc = read_vlrs(&las, err);
-    if (rc == SH_OK) rc = cloud_reserve(out, (size_t)las.n, columns_of(&las, columns), err);
+    if (rc == SH_OK) rc = cloud_make_room(out, (size_t)las.n, columns_of(&las, columns), err);
     if (rc == SH_OK) {
+        out->n = (size_t)las.n;
         out->count_m = count_m(&las);
         out->has_own_counts = is_ours(&las);
         rc = read_points(&las, err);

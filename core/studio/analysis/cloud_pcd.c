@@ -204,7 +204,7 @@ static int take_compressed(struct pcd *g, struct sh_err *err)
     if (out == NULL) return text_fail(&g->t, 0, SH_ENOMEM, err, "no memory for %zu bytes", len);
     int rc = unpack_lzf(in + 8, le_get32(in), out, len) ? SH_OK : pcd_fail(g, err, "its compressed points are damaged");
     if (rc == SH_OK && g->n > len / g->record_len) rc = pcd_fail(g, err, "it has fewer points than its header counts");
-    if (rc == SH_OK) rc = cloud_reserve(g->cloud, (size_t)g->n, 0, err);
+    if (rc == SH_OK) rc = cloud_make_room(g->cloud, (size_t)g->n, 0, err);
     if (rc == SH_OK) rc = take_binary(g, out, len, true, err);
     free(out);
     return rc;
@@ -243,7 +243,7 @@ static int take_points(struct pcd *g, struct sh_err *err)
     const bool is_text = strcmp(g->data, "ascii") == 0;
     if (!is_text && strcmp(g->data, "binary") != 0)
         return pcd_fail(g, err, "DATA is neither ascii, binary nor binary_compressed");
-    const int rc = cloud_reserve(g->cloud, (size_t)g->n, 0, err);
+    const int rc = cloud_make_room(g->cloud, (size_t)g->n, 0, err);
     if (rc != SH_OK) return rc;
     g->cloud->is_text = is_text;
     if (is_text) return take_text(g, err);
@@ -258,6 +258,7 @@ int cloud_read_pcd(const char *path, const struct sh_report *report, struct clou
     int rc = text_open(&g->t, path, NULL, NULL, err);
     if (rc == SH_OK) rc = pcd_read_header(g, err);
     if (rc == SH_OK) rc = take_points(g, err);
+    out->n = (size_t)g->n;
     if (rc == SH_OK && pcd_is_single(g)) cloud_note_single(out, path, report);
     if (rc == SH_OK && g->has_more)
         sh_warn(report, "%s: it goes on after the %llu points that its header counts; the rest is left out", path,

@@ -102,20 +102,22 @@ static int begin_element(void *reading, struct sh_err *err)
 {
     struct reading *g = reading;
     const struct ply_element *e = g->r.element;
-    const struct {
-        enum ply_use use;
-        unsigned bit;
-    } column[] = {{PLY_STATION, CLOUD_HAS_STATION},   {PLY_LABEL, CLOUD_HAS_LABEL},
-                  {PLY_ECHO, CLOUD_HAS_ECHO},         {PLY_TIME, CLOUD_TIME},
-                  {PLY_RANGE, CLOUD_RANGE},           {PLY_REFLECTANCE, CLOUD_REFLECTANCE},
-                  {PLY_ECHO_COUNT, CLOUD_ECHO_COUNT}, {PLY_AMPLITUDE, CLOUD_AMPLITUDE}};
+    static const enum ply_use use_of[CLOUD_COLUMNS] = {[CLOUD_RANGE] = PLY_RANGE,
+                                                       [CLOUD_REFLECTANCE] = PLY_REFLECTANCE,
+                                                       [CLOUD_AMPLITUDE] = PLY_AMPLITUDE,
+                                                       [CLOUD_TIME] = PLY_TIME,
+                                                       [CLOUD_LABEL] = PLY_LABEL,
+                                                       [CLOUD_STATION] = PLY_STATION,
+                                                       [CLOUD_ECHO] = PLY_ECHO,
+                                                       [CLOUD_ECHO_COUNT] = PLY_ECHO_COUNT,
+                                                       [CLOUD_RGB] = PLY_RED};
     unsigned has = 0;
     if (e->kind != PLY_VERTEX) return SH_OK;
-    for (size_t i = 0; i < sizeof column / sizeof column[0]; i++)
-        if (ply_find(&g->r.h, e, column[i].use) != NULL) has |= column[i].bit;
-    if (has_colours(&g->r.h, e)) has |= CLOUD_RGB;
-    has &= g->columns | CLOUD_HAS_STATION | CLOUD_HAS_LABEL | CLOUD_HAS_ECHO;
-    return cloud_reserve(g->cloud, (size_t)e->count, has, err); /* the count is checked against the file's size */
+    for (int c = 0; c < CLOUD_COLUMNS; c++)
+        if (c == CLOUD_RGB ? has_colours(&g->r.h, e) : ply_find(&g->r.h, e, use_of[c]) != NULL) has |= 1u << c;
+    has &= g->columns | 1u << CLOUD_STATION | 1u << CLOUD_LABEL | 1u << CLOUD_ECHO;
+    g->cloud->n = (size_t)e->count; /* it is checked against the file's size */
+    return cloud_make_room(g->cloud, g->cloud->n, has, err);
 }
 
 static int progress(void *reading, double fraction, struct sh_err *err)

@@ -10,12 +10,6 @@
 
 struct text;
 
-/* Further bits for `has`, together with those of enum cloud_column. */
-enum { CLOUD_HAS_STATION = 256, CLOUD_HAS_LABEL = 512, CLOUD_HAS_ECHO = 1024 };
-
-/* Allocates arrays for n points: positions, and those named in `has`. */
-int cloud_reserve(struct cloud *cloud, size_t n, unsigned has, struct sh_err *err);
-
 /* Notes that the file has coordinates in single precision. count_m becomes the rounding step of the largest coordinate,
  * unless count_m is larger already. Warns where the error may be above 0.1 mm. */
 void cloud_note_single(struct cloud *cloud, const char *path, const struct sh_report *report);

@@ -117,7 +117,7 @@ static size_t count_lines(const struct text *t)
 
 static int read_lines(struct table *g, const struct sh_report *report, struct sh_err *err)
 {
-    int rc = cloud_reserve(g->cloud, count_lines(&g->t), 0, err);
+    int rc = cloud_make_room(g->cloud, count_lines(&g->t), 0, err);
     for (; rc == SH_OK && g->t.p < g->t.end; text_next_line(&g->t)) {
         rc = take_line(g, err);
         if (rc == SH_OK && g->t.line % 65536 == 0) rc = sh_check_stop(report, err);

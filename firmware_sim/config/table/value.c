@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Texts to values: exact decimals, ranges, words, paths. */
+#include "firmware_sim/command/decimal.h"
 #include "firmware_sim/config/profile.h"
 #include "firmware_sim/config/profile_keys.h"
 #include "firmware_sim/config/table/diagnostics.h"
@@ -21,65 +22,22 @@ static int is_digit(char c)
     return c >= '0' && c <= '9';
 }
 
-/* A number as it is written. */
-struct decimal {
-    int negative;
-    __int128 digits; /* without the point */
-    int exponent;    /* value = digits * 10^exponent */
-    int too_large;
-};
-
-enum { DECIMAL_MAX_DIGITS = 30, DECIMAL_MAX_EXPONENT = 400 };
-
-static const char *take_digits(const char *p, struct decimal *d, int *n_digits, int step)
+/* Reads a number as YAML has it: of what a command takes, without blanks, and with digits about the point. */
+static int read_decimal(const char *text, struct command_decimal *decimal)
 {
-    for (; is_digit(*p); p++) {
-        if (*n_digits > 0 || *p != '0') ++*n_digits;
-        if (*n_digits > DECIMAL_MAX_DIGITS) d->too_large = 1;
-        if (!d->too_large) d->digits = d->digits * 10 + (*p - '0');
-        d->exponent += step;
-    }
-    return p;
+    const char *end = command_parse_decimal(text, decimal), *point = strchr(text, '.');
+    const char *whole = text + strspn(text, "+-");
+    return end != NULL && *end == '\0' && strpbrk(text, " \t") == NULL && is_digit(*whole) &&
+           (*whole != '0' || !is_digit(whole[1])) && (point == NULL || is_digit(point[1]));
 }
 
-static int scan_decimal(const char *p, struct decimal *d)
+const char *cfg_parse_decimal(const char *text, int decimals, __int128 *out)
 {
-    memset(d, 0, sizeof *d);
-    int n_digits = 0, exponent = 0;
-    if (*p == '-' || *p == '+') d->negative = *p++ == '-';
-    if (!is_digit(*p) || (*p == '0' && is_digit(p[1]))) return 0;
-    p = take_digits(p, d, &n_digits, 0);
-    if (*p == '.') {
-        if (!is_digit(*++p)) return 0;
-        p = take_digits(p, d, &n_digits, -1);
-    }
-    if (*p == 'e' || *p == 'E') {
-        int down = *++p == '-';
-        if (*p == '-' || *p == '+') p++;
-        if (!is_digit(*p)) return 0;
-        for (; is_digit(*p); p++)
-            if (exponent < DECIMAL_MAX_EXPONENT) exponent = exponent * 10 + (*p - '0');
-        d->exponent += down ? -exponent : exponent;
-    }
-    return *p == '\0';
-}
-
-enum cfg_number cfg_parse_decimal(const char *text, int decimals, __int128 *out)
-{
-    struct decimal d;
-    if (!scan_decimal(text, &d)) return CFG_NOT_A_NUMBER;
-    if (d.too_large) return CFG_TOO_LARGE;
-    int exponent = d.exponent + decimals;
-    for (; exponent < 0 && d.digits != 0; exponent++) {
-        if (d.digits % 10 != 0) return CFG_TOO_FINE;
-        d.digits /= 10;
-    }
-    for (; exponent > 0 && d.digits != 0; exponent--) {
-        d.digits *= 10;
-        if (d.digits > (__int128)1 << 96) return CFG_TOO_LARGE;
-    }
-    *out = d.negative ? -d.digits : d.digits;
-    return CFG_NUMBER_OK;
+    struct command_decimal decimal;
+    if (!read_decimal(text, &decimal)) return "not a number";
+    const enum command_fit fit = command_decimal_to_wide(&decimal, decimals, out);
+    if (fit == COMMAND_FIT_FINE) return decimals > 0 ? "finer than 6 decimals" : "not a whole number";
+    return fit == COMMAND_FIT_BIG ? "out of range" : NULL;
 }
 
 int64_t cfg_figure(const struct config_profile *profile, const char *path)
@@ -163,13 +121,13 @@ static int refuse(const struct place *at, const char *text, const char *what)
                           cfg_allowed(at->key, at->rd->profile, allowed));
 }
 
-static enum cfg_number parse_hex(const char *digits, __int128 *out)
+static const char *parse_hex(const char *text, __int128 *out)
 {
-    size_t n = strspn(digits, "0123456789abcdefABCDEF");
-    if (n == 0 || digits[n] != '\0') return CFG_NOT_A_NUMBER;
-    if (n > 16) return CFG_TOO_LARGE;
-    *out = (__int128)strtoull(digits, NULL, 16);
-    return CFG_NUMBER_OK;
+    if (strncmp(text, "0x", 2) != 0) return "without 0x";
+    size_t n = strspn(text + 2, "0123456789abcdefABCDEF");
+    if (n == 0 || text[2 + n] != '\0') return "not a number";
+    *out = (__int128)strtoull(text, NULL, 16);
+    return n > 16 ? "out of range" : NULL;
 }
 
 static int store_whole(const struct place *at, void *dst, const char *text)
@@ -177,18 +135,8 @@ static int store_whole(const struct place *at, void *dst, const char *text)
     const struct cfg_key *key = at->key;
     int decimals = key->type == CFG_MICRO ? 6 : 0;
     __int128 value, unit = key->type == CFG_MICRO ? 1000000 : 1;
-    const int is_hex = (key->flags & CFG_HEX) != 0;
-    if (is_hex && strncmp(text, "0x", 2) != 0) return refuse(at, text, "without 0x");
-    switch (is_hex ? parse_hex(text + 2, &value) : cfg_parse_decimal(text, decimals, &value)) {
-    case CFG_NOT_A_NUMBER:
-        return refuse(at, text, "not a number");
-    case CFG_TOO_FINE:
-        return refuse(at, text, decimals > 0 ? "finer than 6 decimals" : "not a whole number");
-    case CFG_TOO_LARGE:
-        return refuse(at, text, "out of range");
-    case CFG_NUMBER_OK:
-        break;
-    }
+    const char *wrong = key->flags & CFG_HEX ? parse_hex(text, &value) : cfg_parse_decimal(text, decimals, &value);
+    if (wrong != NULL) return refuse(at, text, wrong);
     /* Limits are doubles: the double 0.01 is a little more than 0.01, and 2^64 - 1 rounds up to 2^64. */
     if ((long double)value < roundl((long double)key->min * (long double)unit) ||
         (long double)value > roundl((long double)key->max * (long double)unit) || value > (__int128)UINT64_MAX)
@@ -205,8 +153,8 @@ static int store_whole(const struct place *at, void *dst, const char *text)
 
 static int store_real(const struct place *at, double *dst, const char *text)
 {
-    struct decimal d;
-    if (!scan_decimal(text, &d)) return refuse(at, text, "not a number");
+    struct command_decimal decimal;
+    if (!read_decimal(text, &decimal)) return refuse(at, text, "not a number");
     double value = strtod(text, NULL);
     if (!isfinite(value) || value < at->key->min || value > at->key->max) return refuse(at, text, "out of range");
     memcpy(dst, &value, sizeof value);

@@ -10,10 +10,9 @@
 struct cfg_reader;
 struct config_profile;
 
-enum cfg_number { CFG_NUMBER_OK, CFG_NOT_A_NUMBER, CFG_TOO_FINE, CFG_TOO_LARGE };
 /* Computes text * 10^decimals exactly, as a whole number. Grammar: [+-] digits [. digits] [e [+-] digits], no leading
- * zeros, which YAML 1.1 reads as octal. */
-enum cfg_number cfg_parse_decimal(const char *text, int decimals, __int128 *out);
+ * zeros, which YAML 1.1 reads as octal. Returns what the text is instead ("not a number"), or NULL. */
+const char *cfg_parse_decimal(const char *text, int decimals, __int128 *out);
 /* Stores one scalar; base_dir (with its '/', may be empty) is put before relative paths. */
 int cfg_store(struct cfg_reader *rd, const struct cfg_key *key, uint32_t item, int line, const char *text,
               const char *base_dir);

@@ -183,8 +183,8 @@ static int show(struct showing *s, struct config *cfg, struct sh_err *err)
 {
     struct picturing_bounds bounds;
     app_catch_signals();
-    int rc =
-        cloud_read_columns(s->path, CLOUD_RANGE | CLOUD_REFLECTANCE | CLOUD_RGB, &app_report_seconds, &s->cloud, err);
+    int rc = cloud_read_columns(s->path, 1u << CLOUD_RANGE | 1u << CLOUD_REFLECTANCE | 1u << CLOUD_RGB,
+                                &app_report_seconds, &s->cloud, err);
     if (rc == SH_OK && cfg != NULL) rc = site_load(cfg, &app_report_stderr, &s->site, err);
     s->p->site = s->site;
     if (rc == SH_OK) rc = check_columns(s, err);

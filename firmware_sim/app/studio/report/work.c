@@ -30,7 +30,8 @@ static void leave_out_ghosts(struct report *r)
 static int work_load(struct report *r, struct sh_err *err)
 {
     struct stat file;
-    const unsigned columns = CLOUD_TIME | CLOUD_ECHO_COUNT | (config_head_moves(&r->cfg->platform) ? CLOUD_RANGE : 0u);
+    const unsigned columns =
+        1u << CLOUD_TIME | 1u << CLOUD_ECHO_COUNT | (config_head_moves(&r->cfg->platform) ? 1u << CLOUD_RANGE : 0u);
     int rc = cloud_read_columns(r->cloud_path, columns, &r->report, &r->cloud, err);
     if (rc == SH_OK && stat(r->cloud_path, &file) == 0) r->modified = file.st_mtim;
     if (rc == SH_OK) rc = sites_load(r->cfg, SITE_WRITTEN_OUT, &app_report_stderr, &r->sites, err);

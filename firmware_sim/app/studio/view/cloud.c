@@ -22,9 +22,9 @@ static void leave_out_empty(struct viewed *v)
         }
         if (kept != i) {
             memcpy(p->xyz_m[kept], p->xyz_m[i], sizeof p->xyz_m[i]);
-            for (int c = 0; c < VIEWED_COLUMNS; c++) {
+            for (int c = 0; c < CLOUD_COLUMNS; c++) {
                 size_t size;
-                char *array = (char *)(uintptr_t)viewed_array(p, (enum viewed_column)c, &size);
+                char *array = cloud_array(p, (enum cloud_column)c, &size);
                 if (array != NULL) memcpy(array + kept * size, array + i * size, size);
             }
         }
@@ -82,7 +82,7 @@ static int add_stations(struct viewed *v, struct sh_err *err)
 
 int viewed_load_cloud(struct viewed *v, const struct sh_report *report, struct sh_err *err)
 {
-    const unsigned all = CLOUD_TIME | CLOUD_RANGE | CLOUD_REFLECTANCE | CLOUD_ECHO_COUNT | CLOUD_RGB | CLOUD_AMPLITUDE;
+    const unsigned all = (1u << CLOUD_COLUMNS) - 1;
     int rc = cloud_read_columns(v->path, all, report, &v->points, err);
     if (rc != SH_OK) return rc;
     if (v->points.n > UINT32_MAX)

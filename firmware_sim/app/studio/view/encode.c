@@ -6,16 +6,16 @@
 
 #include "core/bytes.h"
 
-const struct view_column view_columns[VIEWED_COLUMNS] = {
-    [VIEWED_RANGE] = {"range", "m", VIEW_FLOAT32, 1},
-    [VIEWED_REFLECTANCE] = {"reflectance", "dB", VIEW_FLOAT32, 1},
-    [VIEWED_AMPLITUDE] = {"amplitude", "dB", VIEW_FLOAT32, 1},
-    [VIEWED_T] = {"t", "s", VIEW_FLOAT32, 1},
-    [VIEWED_LABEL] = {"label", NULL, VIEW_UINT16, 1},
-    [VIEWED_STATION] = {"station", NULL, VIEW_UINT16, 1},
-    [VIEWED_ECHO] = {"echo", NULL, VIEW_UINT8, 1},
-    [VIEWED_ECHOES] = {"echoes", NULL, VIEW_UINT8, 1},
-    [VIEWED_RGB] = {"rgb", NULL, VIEW_UINT8, 3},
+const struct view_column view_columns[CLOUD_COLUMNS] = {
+    [CLOUD_RANGE] = {"range", "m", VIEW_FLOAT32, 1},
+    [CLOUD_REFLECTANCE] = {"reflectance", "dB", VIEW_FLOAT32, 1},
+    [CLOUD_AMPLITUDE] = {"amplitude", "dB", VIEW_FLOAT32, 1},
+    [CLOUD_TIME] = {"t", "s", VIEW_FLOAT32, 1},
+    [CLOUD_LABEL] = {"label", NULL, VIEW_UINT16, 1},
+    [CLOUD_STATION] = {"station", NULL, VIEW_UINT16, 1},
+    [CLOUD_ECHO] = {"echo", NULL, VIEW_UINT8, 1},
+    [CLOUD_ECHO_COUNT] = {"echoes", NULL, VIEW_UINT8, 1},
+    [CLOUD_RGB] = {"rgb", NULL, VIEW_UINT8, 3},
 };
 
 const struct view_column view_position = {"xyz", "m", VIEW_FLOAT32, 3};
@@ -72,10 +72,10 @@ static void put_positions(const struct slice *s, char *to)
     }
 }
 
-static void put_column(const struct slice *s, enum viewed_column column, char *to)
+static void put_column(const struct slice *s, enum cloud_column column, char *to)
 {
     size_t from_size;
-    const char *array = viewed_array(s->points, column, &from_size);
+    const char *array = cloud_array(s->points, column, &from_size);
     const struct view_column *c = &view_columns[column];
     const size_t size = value_size(c);
     for (uint32_t i = 0; i < s->n; i++) {
@@ -83,7 +83,7 @@ static void put_column(const struct slice *s, enum viewed_column column, char *t
         const char *from = array + at * from_size;
         float f;
         uint16_t u;
-        if (column == VIEWED_T) {
+        if (column == CLOUD_TIME) {
             le_put_float(to + i * size, (float)(s->points->time_s[at] - s->t0_s));
         } else if (c->type == VIEW_FLOAT32) {
             memcpy(&f, from, sizeof f);
@@ -115,12 +115,12 @@ static size_t lay_out(const struct slice *s, uint32_t n_columns, char *body)
         put_positions(s, body + at);
     }
     at += 12 * (size_t)s->n;
-    for (int c = 0; c < VIEWED_COLUMNS; c++) {
-        if (viewed_array(s->points, (enum viewed_column)c, &size) == NULL) continue;
+    for (int c = 0; c < CLOUD_COLUMNS; c++) {
+        if (cloud_array(s->points, (enum cloud_column)c, &size) == NULL) continue;
         if (body != NULL) {
             row += VIEW_CLOUD_COLUMN;
             put_row(row, &view_columns[c], at);
-            put_column(s, (enum viewed_column)c, body + at);
+            put_column(s, (enum cloud_column)c, body + at);
         }
         at += padded(value_size(&view_columns[c]) * s->n);
     }
@@ -134,8 +134,8 @@ int view_encode_points(const struct cloud *points, const double origin_m[3], dou
     const struct slice s = {points, origin_m, t0_s, part->first, part->every, n};
     uint32_t n_columns = 1;
     size_t size;
-    for (int c = 0; c < VIEWED_COLUMNS; c++)
-        n_columns += viewed_array(points, (enum viewed_column)c, &size) != NULL;
+    for (int c = 0; c < CLOUD_COLUMNS; c++)
+        n_columns += cloud_array(points, (enum cloud_column)c, &size) != NULL;
     const size_t len = lay_out(&s, n_columns, NULL);
     char *to = calloc(1, len);
     if (to == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %u points", s.n);

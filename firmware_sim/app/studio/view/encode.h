@@ -26,8 +26,8 @@ struct view_column {
     enum view_type type;
     uint32_t components;
 };
-/* view_columns has a row for each enum viewed_column. An answer has the column of positions before all of these. */
-extern const struct view_column view_columns[VIEWED_COLUMNS], view_position;
+/* view_columns has a row for each enum cloud_column. An answer has the column of positions before all of these. */
+extern const struct view_column view_columns[CLOUD_COLUMNS], view_position;
 const char *view_type_name(enum view_type type);
 
 /* The points that an answer has: numbers `first`, `first` + `every` and so on, at most `most` of them, and no more than

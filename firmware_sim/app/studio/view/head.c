@@ -43,8 +43,8 @@ static void put_columns(const struct viewed *v, struct json *json)
     size_t size;
     json_open_array(json, "columns");
     put_column(json, &view_position, (double)NAN, (double)NAN);
-    for (int c = 0; c < VIEWED_COLUMNS; c++)
-        if (viewed_array(&v->points, (enum viewed_column)c, &size) != NULL)
+    for (int c = 0; c < CLOUD_COLUMNS; c++)
+        if (cloud_array(&v->points, (enum cloud_column)c, &size) != NULL)
             put_column(json, &view_columns[c], v->low[c], v->high[c]);
     json_close_array(json);
 }

@@ -19,9 +19,9 @@ static uint32_t keep_faces(const struct viewed_mesh *m, double long_edge, uint32
 
 static int append(struct cloud *out, const struct mesh_points *from, int coloured, struct sh_err *err)
 {
-    const unsigned has = 1u << VIEWED_RANGE | 1u << VIEWED_REFLECTANCE | 1u << VIEWED_LABEL | 1u << VIEWED_STATION |
-                         (coloured ? 1u << VIEWED_RGB : 0);
-    int rc = viewed_points_room(out, out->n + from->n, has, err);
+    const unsigned has = 1u << CLOUD_RANGE | 1u << CLOUD_REFLECTANCE | 1u << CLOUD_LABEL | 1u << CLOUD_STATION |
+                         (coloured ? 1u << CLOUD_RGB : 0);
+    int rc = cloud_make_room(out, out->n + from->n, has, err);
     for (uint32_t i = 0; rc == SH_OK && i < from->n; i++) {
         const size_t n = out->n++;
         memcpy(out->xyz_m[n], from->xyz_m[i], sizeof out->xyz_m[n]);

@@ -72,14 +72,14 @@ static int stream_make_room(struct viewed_stream *s, struct sh_err *err)
     if (p->n == UINT32_MAX)
         return sh_fail(err, SH_EINPUT, "%s: at most %u points can be shown", s->v->path, UINT32_MAX);
     if (s->has == 0) {
-        s->has = 1u << VIEWED_RANGE | 1u << VIEWED_REFLECTANCE | 1u << VIEWED_T | 1u << VIEWED_LABEL |
-                 1u << VIEWED_STATION | 1u << VIEWED_ECHO | 1u << VIEWED_ECHOES;
-        if (s->track.has_attributes) s->has |= 1u << VIEWED_AMPLITUDE;
-        if (s->track.has_colours) s->has |= 1u << VIEWED_RGB;
+        s->has = 1u << CLOUD_RANGE | 1u << CLOUD_REFLECTANCE | 1u << CLOUD_TIME | 1u << CLOUD_LABEL |
+                 1u << CLOUD_STATION | 1u << CLOUD_ECHO | 1u << CLOUD_ECHO_COUNT;
+        if (s->track.has_attributes) s->has |= 1u << CLOUD_AMPLITUDE;
+        if (s->track.has_colours) s->has |= 1u << CLOUD_RGB;
     }
     size_t room = s->room + s->room / 2 + 65536;
     if (room > UINT32_MAX) room = UINT32_MAX;
-    int rc = viewed_points_room(p, room, s->has, err);
+    int rc = cloud_make_room(p, room, s->has, err);
     if (rc == SH_OK) s->room = room;
     return rc;
 }
@@ -226,8 +226,7 @@ int viewed_load_stream(struct viewed *v, const struct sh_report *report, struct 
     if (rc == SH_OK) rc = track_flush(&s->track, err);
     if (rc == SH_OK) rc = viewed_end_grid(s, err);
     if (rc == SH_OK) rc = take_names(s, sh, err);
-    if (rc == SH_OK && v->points.n > 0)
-        rc = viewed_points_room(&v->points, v->points.n, s->has, err); /* frees the rest */
+    if (rc == SH_OK && v->points.n > 0) rc = cloud_make_room(&v->points, v->points.n, s->has, err); /* frees the rest */
     if (rc == SH_OK) look_for_losses(s, sh);
     if (rc == SH_OK && v->n_meshes == 0 && v->why_no_mesh[0] == '\0')
         snprintf(v->why_no_mesh, sizeof v->why_no_mesh, "no four points lie in neighbouring rows and lines");

@@ -114,35 +114,35 @@ static int turn_to_enu(struct viewed *v, struct sh_err *err)
 /* ---- figures */
 
 /* Value i of a column that has one number a point. */
-static double value_of(const struct cloud *p, enum viewed_column column, uint32_t i)
+static double value_of(const struct cloud *p, enum cloud_column column, uint32_t i)
 {
     switch (column) {
-    case VIEWED_RANGE:
+    case CLOUD_RANGE:
         return (double)p->range_m[i];
-    case VIEWED_REFLECTANCE:
+    case CLOUD_REFLECTANCE:
         return (double)p->reflectance_db[i];
-    case VIEWED_AMPLITUDE:
+    case CLOUD_AMPLITUDE:
         return (double)p->amplitude_db[i];
-    case VIEWED_T:
+    case CLOUD_TIME:
         return p->time_s[i];
-    case VIEWED_LABEL:
+    case CLOUD_LABEL:
         return p->label[i] != CLOUD_LABEL_NONE ? p->label[i] : (double)NAN;
-    case VIEWED_STATION:
+    case CLOUD_STATION:
         return p->station[i];
-    case VIEWED_ECHO:
+    case CLOUD_ECHO:
         return p->echo[i];
-    case VIEWED_ECHOES:
+    case CLOUD_ECHO_COUNT:
         return p->echo_count[i];
     default:
         return (double)NAN;
     }
 }
 
-static void measure_column(struct viewed *v, enum viewed_column column)
+static void measure_column(struct viewed *v, enum cloud_column column)
 {
     double low = INFINITY, high = -INFINITY;
     size_t size;
-    const int there = viewed_array(&v->points, column, &size) != NULL;
+    const int there = cloud_array(&v->points, column, &size) != NULL;
     for (uint32_t i = 0; there && i < v->points.n; i++) {
         const double x = value_of(&v->points, column, i);
         if (!isfinite(x)) continue;
@@ -160,9 +160,9 @@ void viewed_measure(struct viewed *v)
         vec3_bound(v->min_m, v->max_m, v->points.xyz_m[i]);
     for (int k = 0; k < 3; k++)
         v->origin_m[k] = round(0.5 * v->min_m[k] + 0.5 * v->max_m[k]);
-    for (int c = 0; c < VIEWED_COLUMNS; c++)
-        measure_column(v, (enum viewed_column)c);
-    v->t0_s = v->low[VIEWED_T];
+    for (int c = 0; c < CLOUD_COLUMNS; c++)
+        measure_column(v, (enum cloud_column)c);
+    v->t0_s = v->low[CLOUD_TIME];
 }
 
 /* ---- names */

@@ -14,26 +14,6 @@
 #include "core/err.h"
 #include "core/studio/cloud.h"
 
-/* Columns beside the position. */
-enum viewed_column {
-    VIEWED_RANGE,
-    VIEWED_REFLECTANCE,
-    VIEWED_AMPLITUDE,
-    VIEWED_T,
-    VIEWED_LABEL,
-    VIEWED_STATION,
-    VIEWED_ECHO,
-    VIEWED_ECHOES,
-    VIEWED_RGB,
-    VIEWED_COLUMNS
-};
-
-/* The array of a column, or NULL; *size: bytes of one value, its components together. */
-const void *viewed_array(const struct cloud *points, enum viewed_column column, size_t *size);
-/* Makes room for n points in xyz_m and in the columns of `has` (bit c: column c). The array of a column is NULL until
- * the first call that names the column. SH_ENOMEM: the points are unchanged; some arrays may have the new room. */
-int viewed_points_room(struct cloud *points, size_t n, unsigned has, struct sh_err *err);
-
 struct viewed_mesh {
     uint32_t station, scan, sweep;  /* scan: its number in the stream; sweep: its pan sweep */
     uint32_t first_point, n_points; /* its corners are among these points of the recording */
@@ -74,7 +54,7 @@ struct viewed {
     char idn[128], profile[64]; /* empty: not known */
     /* of all points: */
     double min_m[3], max_m[3], origin_m[3], t0_s;
-    double low[VIEWED_COLUMNS], high[VIEWED_COLUMNS]; /* over values that are known; NaN: none */
+    double low[CLOUD_COLUMNS], high[CLOUD_COLUMNS]; /* over values that are known; NaN: none */
 };
 
 /* Loads by the file's ending and first bytes. Errors name the file: SH_EINPUT where it is no recording, SH_EIO,

@@ -80,7 +80,7 @@ struct watch {
     /* for the observer's thread alone, except for constants */
     struct deviation_head *head; /* [n_stations] */
     struct deviation_head now;   /* of the scan at hand */
-    struct device_held held;     /* keeps the site of `now` */
+    struct device_version *held; /* keeps the site of `now` */
     struct georef *now_georef;   /* of the scan at hand; NULL: its points are in the scene's frame, or nowhere */
     struct watch_sample sample;
     struct watch_seen seen;

@@ -36,7 +36,8 @@ static int follow_georef(struct watch *w, const struct georef *of, const struct 
 
 static void let_go(struct watch *w)
 {
-    device_let_go(&w->held);
+    device_give_back(w->held);
+    w->held = NULL;
     georef_free(w->now_georef);
     w->now_georef = NULL;
 }
