@@ -161,7 +161,7 @@ static void detect_gaussians(const struct finder_run *run, struct finder_list *l
         if (end > i + 1 || finder_limited(run, &peak[i]) || !finder_fit(run, &peak[i], &mix.g[0]))
             finder_decompose(run, &peak[i], end - i, 1, &mix);
         for (uint32_t j = 0; j < mix.n; j++)
-            finder_add_term(run, &mix, j, finder->peak, list);
+            finder_add_term(run, &mix, j, list);
     }
 }
 
@@ -229,15 +229,17 @@ void finder_add(const struct finder_run *run, const struct finder_found *found, 
     detect_insert(list, &echo);
 }
 
-void finder_add_term(const struct finder_run *run, const struct finder_mix *mix, uint32_t self, double least,
+void finder_add_term(const struct finder_run *run, const struct finder_mix *mix, uint32_t self,
                      struct finder_list *list)
 {
     const struct finder_term *g = &mix->g[self];
+    const double level = run->finder->peak;
     struct finder_spread spread;
     finder_find(run->finder, FINDER_SIGMA, g->sigma, &spread);
-    const struct finder_found found = {g->at - spread.lag, g->peak * spread.gain, spread.width,
-                                       (int)(mix->limited >> self & 1)};
-    if (found.peak >= least) finder_add(run, &found, mix, self, list);
+    struct finder_found found = {g->at - spread.lag, g->peak * spread.gain, spread.width,
+                                 (int)(mix->limited >> self & 1)};
+    if (mix->seen >> self & 1) found.peak = fmax(found.peak, level);
+    if (found.peak >= level) finder_add(run, &found, mix, self, list);
 }
 
 uint32_t waveform_detect(const struct waveform *waveform, enum waveform_detector detector,

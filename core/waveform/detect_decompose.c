@@ -102,6 +102,7 @@ static int decompose_begin(const struct finder_run *run, const struct finder_pea
         double side[2], height = run->y[peak[j].top];
         if (finder_limited(run, &peak[j])) {
             mix->limited |= 1U << j;
+            if (height >= run->finder->peak) mix->seen |= 1U << j;
             mix->open |= 1U << j;
             blind |= decompose_limited(run, &peak[j], g);
             continue;

@@ -25,7 +25,7 @@ static int edges_hidden(const struct finder_run *run, const struct finder_peak *
     if (!finder_limited(run, peak) && peak->top > 0 && peak->top + 1 < run->n) return 0;
     struct finder_mix mix;
     finder_decompose(run, peak, 1, 0, &mix);
-    finder_add_term(run, &mix, 0, run->finder->peak, list);
+    finder_add_term(run, &mix, 0, list);
     return 1;
 }
 

@@ -129,6 +129,7 @@ double finder_noise2(const struct finder *finder, double n);
  * of its peak on neither side. */
 struct finder_mix {
     uint32_t n, open, limited; /* limited: bit j is set where component j is limited */
+    uint32_t seen;             /* bit j is set where component j is limited, and its top sample reaches the level */
     struct finder_term g[FINDER_MIX];
     double chi2;
 };
@@ -137,8 +138,9 @@ struct finder_mix {
  * components of its mixture are subtracted first. */
 void finder_add(const struct finder_run *run, const struct finder_found *found, const struct finder_mix *mix,
                 uint32_t self, struct finder_list *list);
-/* Adds the echo that term `self` of a mixture stands for, if its peak is `least` or more. */
-void finder_add_term(const struct finder_run *run, const struct finder_mix *mix, uint32_t self, double least,
+/* Adds the echo that term `self` of a mixture stands for, if its peak reaches the level of detection. Where a limited
+ * sample reaches the level, the light does: a fit that says less gives the peak of the level. */
+void finder_add_term(const struct finder_run *run, const struct finder_mix *mix, uint32_t self,
                      struct finder_list *list);
 
 /* Fits one term through the samples near a peak. Returns 1 where it explains the samples from `peak`'s first to its

@@ -13,6 +13,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "core/newfile.h"
 #include "drivers/record/las_inside.h"
 
 static int las_begin(void *rec, struct sh_err *err)
@@ -114,6 +115,14 @@ static int end_waves(struct las *las, struct sh_err *err)
     return rc;
 }
 
+/* The points are synced first. Else a power cut could leave X.wdp beside a .part whose header does not say that it is
+ * complete, and X.wdp would count as that of an older recording (las_waves_repair.c). */
+static int keep_waves(struct las *las, struct sh_err *err)
+{
+    const int rc = newfile_sync(las->base.file.part, las->base.file.fd, err);
+    return rc == 0 ? las_waves_keep(&las->waves, err) : rc;
+}
+
 static void report_waves(struct las *las)
 {
     const struct recorder *r = &las->base;
@@ -143,7 +152,7 @@ static int las_finish(void *rec, struct sh_err *err)
     if (rc == 0 && las->facts.has_waves) rc = end_waves(las, err);
     las->facts.incomplete = 0;
     if (rc == 0) rc = las_write_front(las, err);
-    if (rc == 0 && las->facts.has_waves && las->base.options.las_wdp) rc = las_waves_keep(&las->waves, err);
+    if (rc == 0 && las->facts.has_waves && las->base.options.las_wdp) rc = keep_waves(las, err);
     if (rc != 0) return rc;
     report_waves(las);
     recorder_report(rec, las->base.track.missing.n_empty, "shots without echo left out; LAS has no place for them");

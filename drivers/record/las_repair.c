@@ -76,6 +76,17 @@ static int make_whole(struct repair *repair, uint8_t *header, struct records *r,
     return rc == SH_OK ? repair_write(repair, 0, renewed, len, err) : rc;
 }
 
+/* Returns where the points end at the latest. The header counts points once all of them are written, and then packets
+ * may follow them, or zeros of a power cut. */
+static uint64_t limit_points(const struct repair *repair, const uint8_t *header, const struct records *r,
+                             uint32_t front_len)
+{
+    const uint64_t n = r->facts.minor == 2 ? le_get32(header + 107) : le_get64(header + LAS_POINTS_AT);
+    const uint64_t begin = r->has_waves ? r->packets.begin : 0;
+    if (begin != 0) return begin < repair->len ? begin : repair->len;
+    return n != 0 && n <= (repair->len - front_len) / r->len ? front_len + n * r->len : repair->len;
+}
+
 static int las_repair_all(struct repair *repair, uint8_t header[LAS_HEADER_LEN], struct records *r, struct sh_err *err)
 {
     uint32_t front_len = 0;
@@ -84,13 +95,13 @@ static int las_repair_all(struct repair *repair, uint8_t header[LAS_HEADER_LEN],
     if (rc == SH_OK) rc = parse_header(repair, header, len, r, &front_len, err);
     if (rc == SH_OK && r->has_waves) rc = las_packets_find(&r->packets, repair, header, err);
     if (rc == SH_OK) {
-        const uint64_t end = r->has_waves ? las_packets_limit(&r->packets, repair, header) : repair->len;
+        const uint64_t end = limit_points(repair, header, r, front_len);
         struct repair_rows rows = {front_len, (end - front_len) / r->len, r->len};
         rc = repair_leave_zeros(repair, &rows, end, RETURN_AT + 1, err); /* no record of ours has return 0 */
         if (rc == SH_OK) rc = repair_rows(repair, &rows, take_record, r, err);
     }
     if (rc == SH_OK) rc = make_whole(repair, header, r, front_len, err);
-    return rc == SH_OK && r->has_waves ? las_packets_settle(&r->packets, err) : rc;
+    return rc == SH_OK && r->has_waves ? las_packets_settle(&r->packets, repair, err) : rc;
 }
 
 int las_repair(struct repair *repair, struct sh_err *err)

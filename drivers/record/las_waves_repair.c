@@ -33,34 +33,51 @@ static int fail_head(const struct las_packets *p, const struct repair *r, struct
                    p->path, r->path);
 }
 
-/* A power cut may leave zeros at the end of a file that was not completed. Where they reach into the head, that head
- * counts as cut. */
-static int find_zeros(struct las_packets *p, const struct repair *r, struct sh_err *err)
+/* Returns 1 where the record ends where its own length says. */
+static int is_as_long(const struct las_packets *p)
+{
+    return p->len >= LAS_WAVES_HEAD_LEN && p->own_len == p->len - LAS_WAVES_HEAD_LEN;
+}
+
+/* Where zeros reach into the head, that head counts as cut. */
+static int find_zeros(struct las_packets *p, struct sh_err *err)
 {
     static const uint64_t HEAD_TEXT_END = 49; /* zeros follow in each head */
-    const uint64_t end = p->begin + p->len;
-    int rc = SH_OK;
-    p->zeros_at = end;
-    if (repair_is_part(r)) rc = repair_find_zeros(&p->file, p->begin, end, &p->zeros_at, err);
+    const int rc = repair_find_zeros(&p->file, p->begin, p->begin + p->len, &p->zeros_at, err);
     p->zeros_at -= p->begin;
     if (p->zeros_at < HEAD_TEXT_END) p->len = p->zeros_at;
     return rc;
 }
 
-/* Checks the head of the record, as far as it is there: any file may have the name X.wdp. A completed record says its
- * length. A record that is being written says 0. */
-static int read_head(struct las_packets *p, const struct repair *r, struct sh_err *err)
+/* Returns 1 where a .wdp was not completed, or a record inside a .las. Somebody may have given both .part files their
+ * final names: then the header has no counts, and the record has no length. */
+static int is_left_over(const struct las_packets *p, const struct repair *r, const uint8_t *header)
 {
-    uint8_t is[LAS_WAVES_HEAD_LEN], head[LAS_WAVES_HEAD_LEN];
-    int rc = find_zeros(p, r, err);
-    const size_t n = p->len < sizeof is ? (size_t)p->len : sizeof is;
-    if (rc == SH_OK) rc = repair_read(&p->file, p->begin, is, n, err);
+    const int is_incomplete = strcmp((const char *)header + LAS_SOFTWARE_AT, LAS_SOFTWARE_INCOMPLETE) == 0;
+    return repair_is_part(&p->file) ||
+           (!repair_is_part(r) && is_incomplete && le_get64(header + LAS_POINTS_AT) == 0 && p->own_len == 0);
+}
+
+/* Checks the head of the record, as far as it is there: any file may have the name X.wdp. A completed record says its
+ * length. A record that is being written says 0. A power cut may leave zeros at the end of a file that was not
+ * completed, also where the record is as long as it says. A file with its final name was synced before, so zeros at its
+ * end are samples. */
+static int read_head(struct las_packets *p, const struct repair *r, const uint8_t *header, struct sh_err *err)
+{
+    uint8_t is[LAS_WAVES_HEAD_LEN] = {0}, head[LAS_WAVES_HEAD_LEN];
+    size_t n = p->len < sizeof is ? (size_t)p->len : sizeof is;
+    int rc = repair_read(&p->file, p->begin, is, n, err);
+    p->own_len = le_get64(is + LAS_WAVES_LEN_AT);
+    p->zeros_at = p->len;
+    p->is_left = is_left_over(p, r, header);
+    if (rc == SH_OK && p->is_left) rc = find_zeros(p, err);
     if (rc != SH_OK) return rc;
+    if (n > p->len) n = (size_t)p->len;
     las_waves_head(head);
     if (n > LAS_WAVES_LEN_AT) memcpy(head + LAS_WAVES_LEN_AT, is + LAS_WAVES_LEN_AT, n < 28 ? n - LAS_WAVES_LEN_AT : 8);
     if (memcmp(is, head, n) != 0) return fail_head(p, r, err);
-    const uint64_t len = le_get64(head + LAS_WAVES_LEN_AT);
-    if (n == sizeof is && len <= p->len - n && p->zeros_at == p->len) p->end = n + len;
+    const int is_believed = n == sizeof is && p->own_len <= p->len - n && p->zeros_at == p->len;
+    if (is_believed && (is_inside(p) || !p->is_left)) p->end = n + p->own_len;
     return SH_OK;
 }
 
@@ -90,10 +107,12 @@ static int choose_name(const struct repair *r, const uint8_t *header, int is_ren
         return sh_fail(err, SH_ESTATE, "%s: %s exists, and is not replaced; move it away, and repeat the command", part,
                        wdp);
     if (*is_part || (repair_exists(wdp) && (!repair_is_part(r) || may_be_final(header, is_renamed)))) return SH_OK;
+    const int is_with_other = repair_is_part(r) && repair_exists(wdp);
     return sh_fail(err, SH_EINPUT,
-                   "%s: its waveforms are not there: put %s beside it; or an empty file of that name, to keep the "
-                   "points alone",
-                   r->path, repair_is_part(r) ? part : wdp);
+                   "%s: its waveforms are not there: put %s beside it%s%s%s; or an empty file of that name, to keep "
+                   "the points alone",
+                   r->path, repair_is_part(r) ? part : wdp, is_with_other ? " (rename " : "", is_with_other ? wdp : "",
+                   is_with_other ? ", if it is of this recording)" : "");
 }
 
 static int find_outside(struct las_packets *p, const struct repair *r, const uint8_t *header, struct sh_err *err)
@@ -115,7 +134,7 @@ static int find_outside(struct las_packets *p, const struct repair *r, const uin
     free(las);
     p->file.path = p->path;
     if (rc == SH_OK) rc = packets_open(p, is_part, err);
-    return rc == SH_OK ? read_head(p, r, err) : rc;
+    return rc == SH_OK ? read_head(p, r, header, err) : rc;
 }
 
 /* Checks where the header says that the packets are. Inside the file, their record begins where a point ends. The
@@ -132,7 +151,8 @@ static int check_place(const struct repair *r, const uint8_t *header, struct sh_
 
 int las_packets_find(struct las_packets *p, const struct repair *r, const uint8_t *header, struct sh_err *err)
 {
-    *p = (struct las_packets){.file = {.fd = -1, .report = r->report}, .end = LAS_WAVES_HEAD_LEN};
+    *p = (struct las_packets){
+        .file = {.fd = -1, .report = r->report}, .end = LAS_WAVES_HEAD_LEN, .last = LAS_WAVES_HEAD_LEN};
     p->wave_at = header[104] == 9 ? 30 : 38;
     p->begin = le_get64(header + LAS_WAVES_AT);
     const int rc = check_place(r, header, err);
@@ -141,15 +161,7 @@ int las_packets_find(struct las_packets *p, const struct repair *r, const uint8_
     if (p->begin == 0) return SH_OK;
     p->file = *r;
     p->len = r->len > p->begin ? r->len - p->begin : 0;
-    return read_head(p, r, err);
-}
-
-uint64_t las_packets_limit(const struct las_packets *p, const struct repair *r, const uint8_t *header)
-{
-    const uint64_t n = le_get64(header + LAS_POINTS_AT), front = le_get32(header + 96), len = le_get16(header + 105);
-    if (p->begin != 0) return p->begin < r->len ? p->begin : r->len;
-    /* Packets that were being copied may follow the points; the points were counted before that. */
-    return n != 0 && n < (r->len - front) / len ? front + n * len : r->len;
+    return read_head(p, r, header, err);
 }
 
 struct reference {
@@ -178,8 +190,8 @@ void las_packets_take(struct las_packets *p, const uint8_t *record)
     if (!refers(p, record, &packet)) return;
     if (!is_there(p, &packet))
         p->n_without++;
-    else if (packet.end > p->end)
-        p->end = packet.end;
+    else if (packet.end > p->last)
+        p->last = packet.end;
 }
 
 /* Packets are written in the order of points, and before them. So only the last points may lack theirs. */
@@ -211,16 +223,18 @@ static int set_len(struct las_packets *p, struct sh_err *err)
     return rc == SH_OK ? 1 : rc;
 }
 
-/* A .las with its final name was whole beside its .wdp. So a .wdp that is too short for it is a piece, or that of
- * another recording: the points keep their references, which they need for the right one. */
+/* A .wdp with its final name was completed, and is not cut. So a .wdp that is too short for the points is a piece, or
+ * that of another recording: the points keep their references, which they need for the right one. A .las.part may lie
+ * beside the .wdp of an older recording. Its own one ends with the packet of a point. */
 static int check_whole(const struct las_packets *p, const struct repair *r, struct sh_err *err)
 {
     const int is_short = p->n_without > 0 || p->len < LAS_WAVES_HEAD_LEN;
-    if (is_inside(p) || repair_is_part(r) || p->len == 0 || !is_short) return SH_OK;
+    const int is_other = repair_is_part(r) && (!is_as_long(p) || p->last != p->len);
+    if (is_inside(p) || p->is_left || p->len == 0 || !(is_short || is_other)) return SH_OK;
     return sh_fail(err, SH_EFORMAT,
-                   "%s: is shorter than the points of %s need: put the right one there; or an empty file of that name, "
-                   "to keep the points alone; both are unchanged",
-                   p->path, r->path);
+                   "%s: is %s of %s: put the right one there; or an empty file of that name, to keep the points alone; "
+                   "both are unchanged",
+                   p->path, is_short ? "too short for the points" : "not as long as the waveforms", r->path);
 }
 
 /* Not even the head of the record is there, so no point has a packet. */
@@ -233,6 +247,7 @@ static void leave_out_record(uint8_t *header)
 int las_packets_repair(struct las_packets *p, struct repair *r, const struct repair_rows *points, uint8_t *header,
                        struct sh_err *err)
 {
+    if (p->last > p->end) p->end = p->last;
     int rc = check_whole(p, r, err), changed = p->n_without > 0 || p->len > p->end;
     if (rc == SH_OK) rc = clear_points(p, r, points, err);
     if (rc == SH_OK && p->n_without > 0)
@@ -253,14 +268,16 @@ int las_packets_repair(struct las_packets *p, struct repair *r, const struct rep
     return changed;
 }
 
-int las_packets_settle(struct las_packets *p, struct sh_err *err)
+int las_packets_settle(struct las_packets *p, const struct repair *r, struct sh_err *err)
 {
     if (p->target == NULL) return SH_OK;
+    int rc = newfile_sync(r->path, r->fd, err);
+    if (rc != SH_OK) return rc;
     if (p->len < LAS_WAVES_HEAD_LEN) { /* nothing refers to it any more */
         unlink(p->path);
         return SH_OK;
     }
-    const int rc = newfile_settle_free(p->target, p->path, p->file.fd, err);
+    rc = newfile_settle_free(p->target, p->path, p->file.fd, err);
     if (rc == SH_OK) p->file.fd = -1;
     return rc;
 }

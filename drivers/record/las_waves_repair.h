@@ -14,7 +14,10 @@ struct las_packets {
     uint64_t begin;      /* of the record of packets in its file */
     uint64_t len;        /* bytes of it that are there */
     uint64_t zeros_at;   /* where the zeros of a power cut begin in it; len: there are none */
-    uint64_t end;        /* where its packets end: after the last one that its length covers or a point refers to */
+    uint64_t own_len;    /* bytes that follow its head, as it says itself; 0 while it is being written */
+    int is_left;         /* its recorder did not complete it */
+    uint64_t last;       /* where the last packet ends that is there and that a point refers to */
+    uint64_t end;        /* where its packets end: there, or where its own length ends in a file that was completed */
     size_t wave_at;      /* in a point's record */
     uint64_t n_without;  /* points whose packets are not there */
 };
@@ -25,14 +28,13 @@ int las_packets_find(struct las_packets *packets, const struct repair *repair, c
                      struct sh_err *err);
 /* Takes each point's record that is kept. */
 void las_packets_take(struct las_packets *packets, const uint8_t *record);
-/* Returns where the points end at the latest. */
-uint64_t las_packets_limit(const struct las_packets *packets, const struct repair *repair, const uint8_t *header);
 /* Makes points and packets whole, and says in the header where the packets are. Returns 1 where something was
  * changed, 0 where nothing had to be, or a negative error. */
 int las_packets_repair(struct las_packets *packets, struct repair *repair, const struct repair_rows *points,
                        uint8_t *header, struct sh_err *err);
-/* Gives the .wdp its name, if it gets one; without even the head of its record, that .wdp is removed instead. */
-int las_packets_settle(struct las_packets *packets, struct sh_err *err);
+/* Gives the .wdp its name, if it gets one; without even the head of its record, that .wdp is removed instead. The .las is
+ * synced before: its header then says that X.wdp is its own. */
+int las_packets_settle(struct las_packets *packets, const struct repair *repair, struct sh_err *err);
 void las_packets_free(struct las_packets *packets);
 
 #endif

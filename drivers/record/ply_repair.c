@@ -229,6 +229,13 @@ static int take_text(void *ctx, const char *line, size_t len)
     return 1;
 }
 
+/* Returns where binary rows end at the latest. Only a header that was completed counts all of them. */
+static uint64_t limit_rows(const struct repair *r, const struct ply_header *h)
+{
+    const int is_counted = !h->is_incomplete && h->n_vertices > 0 && h->n_vertices < (r->len - h->len) / h->row_len;
+    return is_counted ? h->len + h->n_vertices * h->row_len : r->len;
+}
+
 /* Sets *end to where the last whole row ends. */
 static int read_points(const struct repair *r, const struct ply_header *h, struct points *p, uint64_t *end,
                        struct sh_err *err)
@@ -237,8 +244,10 @@ static int read_points(const struct repair *r, const struct ply_header *h, struc
         const int rc = repair_lines(r, h->len, take_text, p, end, err);
         return rc == SH_OK ? repair_check_rest(r, *end, HEADER_BEGIN, err) : rc;
     }
-    struct repair_rows rows = {h->len, (r->len - h->len) / h->row_len, h->row_len};
-    int rc = rows.n != h->n_vertices ? repair_leave_zeros(r, &rows, r->len, 1, err) : SH_OK; /* else all may be whole */
+    const uint64_t limit = limit_rows(r, h);
+    struct repair_rows rows = {h->len, (limit - h->len) / h->row_len, h->row_len};
+    const int may_end_in_zeros = limit != r->len || rows.n != h->n_vertices; /* else all rows may be whole */
+    int rc = may_end_in_zeros ? repair_leave_zeros(r, &rows, limit, 1, err) : SH_OK;
     if (rc == SH_OK) rc = repair_rows(r, &rows, take_binary, p, err);
     *end = h->len + p->n * h->row_len;
     return rc;

@@ -111,7 +111,8 @@ int repair_find_zeros(const struct repair *r, uint64_t from, uint64_t end, uint6
     while (rc == SH_OK && n == 0 && end > from) {
         n = end - from < BLOCK ? (size_t)(end - from) : BLOCK;
         end -= n;
-        rc = repair_read(r, end, block, n, err);
+        rc = sh_check_stop(r->report, err);
+        if (rc == SH_OK) rc = repair_read(r, end, block, n, err);
         while (rc == SH_OK && n > 0 && block[n - 1] == 0)
             n--;
     }

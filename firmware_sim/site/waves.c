@@ -168,7 +168,7 @@ static void warn_gate(const struct config *cfg, const struct sh_report *report)
             cfg->file, w->near_m, w->far_m, p->name, p->range_min_m, p->range_max_m);
 }
 
-/* Returns the full width at half maximum of the table, ns. */
+/* Returns the full width at half maximum of the table, ns. Where the table begins or ends above half, the pulse does. */
 static double width_of(const struct pulse_table *table)
 {
     uint32_t top = 0;
@@ -180,9 +180,10 @@ static double width_of(const struct pulse_table *table)
         a--;
     while (b + 1 < table->n && table->power[b] > half)
         b++;
-    const double before = a < top ? (half - table->power[a]) / (table->power[a + 1] - table->power[a]) : 0.0;
-    const double after = b > top ? (half - table->power[b]) / (table->power[b - 1] - table->power[b]) : 0.0;
-    return (b - a - fmax(before, 0.0) - fmax(after, 0.0)) * table->step_ns;
+    const double at_a = table->power[a], at_b = table->power[b];
+    const double before = at_a < half ? (half - at_a) / (table->power[a + 1] - at_a) : 0.0;
+    const double after = at_b < half ? (half - at_b) / (table->power[b - 1] - at_b) : 0.0;
+    return (b - a - before - after) * table->step_ns;
 }
 
 /* Points that are not found in the samples are those of a pulse as wide as the profile's. */

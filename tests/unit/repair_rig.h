@@ -23,6 +23,9 @@ extern const struct repair_format repair_formats[REPAIR_FORMATS];
 extern struct bytes repair_left[REPAIR_FORMATS], repair_whole[REPAIR_FORMATS];
 extern struct sh_err repair_err;
 
+/* Where it is not NULL, it is called in place of each fsync. */
+extern void (*repair_at_sync)(int fd);
+
 int repair_set_up(void **state);
 int repair_tear_down(void **state);
 

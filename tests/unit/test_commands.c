@@ -76,6 +76,9 @@ static void all_formats_are_recorded_at_once(void **state)
     does(&app_record, "--repair a.ply --repair a.las --stats -", 0);
     has(on_out, "\"file\": \"a.ply\",\n    \"unit\": \"points\",\n    \"kept\": 1228,\n");
     has(on_out, "\"cut_bytes\": 0,\n    \"was_whole\": true,\n");
+    assert_int_equal(rename("b.ply", "b.ply.part"), 0);
+    does(&app_record, "--repair b.ply.part --repair b.ply --repair b.ply", 0); /* one after the other */
+    has(on_err, "b.ply: whole: 1228 points");
     does(&app_record, "--repair none.ply --stats -", 2);
     has(on_out, "\"file\": \"none.ply\",\n    \"error\": \"none.ply");
 }

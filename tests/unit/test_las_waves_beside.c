@@ -81,6 +81,7 @@ static void check_not_there(const void *packets, size_t len)
     struct repaired file;
     assert_int_equal(repair_file(repair_part, NULL, &file, &repair_err), SH_EINPUT);
     assert_non_null(strstr(repair_err.text, wdp_part));
+    assert_non_null(strstr(repair_err.text, "if it is of this recording"));
     const struct bytes is = repair_slurp(wdp);
     assert_int_equal(packets_len_of(repair_part), left.len);
     assert_int_equal(is.len, len);
@@ -119,6 +120,126 @@ static void test_older_wdp(void **state)
     unlink(repair_part);
     unlink(wdp);
     free(las.data);
+}
+
+/* The packets of an older recording: `more` packets more or fewer than those of this one, and a length that is right.
+ * The last sample is less than 256, as most of 16 bits are, so the file ends in a zero byte. */
+static struct bytes older_packets(int more)
+{
+    const size_t first = (size_t)rig_uint(whole.data + 227, 8), n = whole.len - first;
+    struct bytes b = {calloc(1, n + 8 * PACKET), n + (size_t)(8 + more) * PACKET - 8 * PACKET};
+    memcpy(b.data, whole.data + first, b.len < n ? b.len : n);
+    for (size_t i = n; i < b.len; i++)
+        b.data[i] = 7;
+    b.data[b.len - 1] = 0;
+    put_int(&b, 20, b.len - EVLR, 8);
+    return b;
+}
+
+/* The header counts the points, before the packets are copied or when all is complete. X.las.part is left alone then,
+ * with X.wdp of an older recording beside it: no byte of either changes, though zeros are at X.wdp's end. */
+static void test_older_wdp_of_another_length(void **state)
+{
+    (void)state;
+    for (int is_complete = 0; is_complete < 2; is_complete++)
+        for (int more = -3; more <= 3; more++) {
+            struct bytes las = las_outside(), packets = older_packets(more);
+            if (!is_complete) memcpy(las.data + 58, "scanhead, its end is missing", 29);
+            repair_write_file(repair_part, las.data, las.len);
+            if (more != 0) check_untouched(repair_part, wdp, packets.data, packets.len);
+            /* Fewer points need fewer packets: then one of the same length is longer than they need. */
+            las.len -= POINT;
+            repair_write_file(repair_part, las.data, las.len);
+            if (more >= 0) check_untouched(repair_part, wdp, packets.data, packets.len);
+            unlink(repair_part);
+            free(las.data);
+            free(packets.data);
+        }
+}
+
+/* A repair that is interrupted between its two renames leaves X.las.part and X.wdp, and goes on where it was: also
+ * where X.wdp.part was completed, and has packets for points that were lost. */
+static void test_interrupted(void **state)
+{
+    (void)state;
+    for (size_t lost = 0; lost < 3; lost++) {
+        struct bytes las = las_outside(), packets = older_packets(0);
+        struct repaired file;
+        las.len = left.len - lost * POINT;
+        memcpy(las.data, left.data, packets_front_of(&left));
+        repair_write_file(repair_part, las.data, las.len);
+        repair_write_file(wdp_part, packets.data, packets.len);
+        assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), 0);
+        assert_int_equal(file.n_kept, 2 * N - lost);
+        repair_free(&file);
+        assert_int_equal(packets_len_of(wdp), packets.len - lost * PACKET);
+        assert_int_equal(rename(repair_path, repair_part), 0);
+        if (repair_file(repair_path, NULL, &file, &repair_err) != 0) fail_msg("%s", repair_err.text);
+        assert_true(file.was_whole && file.n_kept == 2 * N - lost);
+        repair_free(&file);
+        unlink(repair_path);
+        unlink(wdp);
+        free(las.data);
+        free(packets.data);
+    }
+}
+
+/* Both .part files were given their final names by hand. They are repaired as before: zeros at the end of X.wdp are
+ * those of a power cut, and points without packets say so. */
+static void test_renamed_by_hand(void **state)
+{
+    (void)state;
+    for (size_t n_zeros = 0; n_zeros <= 512; n_zeros += 512) {
+        const size_t len = left_wdp.len - 5 * PACKET - 3;
+        struct bytes packets = {calloc(1, len + n_zeros), len + n_zeros};
+        struct repaired file;
+        memcpy(packets.data, left_wdp.data, len);
+        repair_write_file(repair_path, left.data, left.len);
+        repair_write_file(wdp, packets.data, packets.len);
+        if (repair_file(repair_path, NULL, &file, &repair_err) != 0) fail_msg("%s", repair_err.text);
+        assert_true(!file.was_whole && file.n_kept == 2 * N);
+        repair_free(&file);
+        assert_int_equal(packets_len_of(wdp), left_wdp.len - 6 * PACKET);
+        if (repair_file(repair_path, NULL, &file, &repair_err) != 0) fail_msg("%s", repair_err.text);
+        assert_true(file.was_whole);
+        repair_free(&file);
+        unlink(repair_path);
+        unlink(wdp);
+        free(packets.data);
+    }
+}
+
+static int points_were_first;
+
+static void note_sync(int fd)
+{
+    char link_name[40], name[300] = "";
+    snprintf(link_name, sizeof link_name, "/proc/self/fd/%d", fd);
+    if (readlink(link_name, name, sizeof name - 1) < 0) return;
+    if (strcmp(name, repair_part) == 0 && access(wdp, F_OK) != 0) points_were_first = 1;
+}
+
+/* A power cut may come after any rename. Then the header of X.las.part must be on the disk already: it says that X.wdp
+ * is its own. */
+static void test_points_are_synced_first(void **state)
+{
+    (void)state;
+    struct repaired file;
+    repair_at_sync = note_sync;
+    packets_put_stream(2, N_SAMPLES);
+    assert_int_equal(rig_record(repair_path, (struct recorder_options){.las_wdp = 1}, RIG_KEEP, &repair_err), 0);
+    assert_int_equal(points_were_first, 1);
+    unlink(repair_path);
+    unlink(wdp);
+    points_were_first = 0;
+    repair_write_file(repair_part, left.data, left.len);
+    repair_write_file(wdp_part, left_wdp.data, left_wdp.len);
+    assert_int_equal(repair_file(repair_path, NULL, &file, &repair_err), 0);
+    assert_int_equal(points_were_first, 1);
+    repair_at_sync = NULL;
+    repair_free(&file);
+    unlink(repair_path);
+    unlink(wdp);
 }
 
 /* The record inside a .las has a head, too. */
@@ -192,6 +313,10 @@ int main(void)
         cmocka_unit_test(test_foreign_wdp),
         cmocka_unit_test(test_foreign_inside),
         cmocka_unit_test(test_older_wdp),
+        cmocka_unit_test(test_older_wdp_of_another_length),
+        cmocka_unit_test(test_interrupted),
+        cmocka_unit_test(test_renamed_by_hand),
+        cmocka_unit_test(test_points_are_synced_first),
         cmocka_unit_test(test_zeros),
     };
     return cmocka_run_group_tests(tests, packets_set_up, packets_tear_down);

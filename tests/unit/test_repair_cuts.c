@@ -188,6 +188,39 @@ static void test_zeros(void **state)
     }
 }
 
+/* A whole file whose last row ends in a zero byte, and then zeros: the header counts that row. */
+static void test_zeros_after_a_whole_file(void **state)
+{
+    (void)state;
+    static const char count[] = "\nelement vertex ";
+    for (int i = 0; i < REPAIR_FORMATS; i++) {
+        const int is_las = strstr(repair_formats[i].name, ".las") != NULL;
+        if (!is_las && (strstr(repair_formats[i].name, ".ply") == NULL || i == REPAIR_ASCII)) continue;
+        const size_t n = repair_whole[i].len;
+        struct repaired file;
+        struct bytes got, longer = {calloc(1, n + 100), n + 100};
+        memcpy(longer.data, repair_whole[i].data, n);
+        longer.data[n - 1] = 0;
+        repair_name(repair_formats[i].name);
+        if (!repair(longer.data, longer.len, &file, &got)) fail_msg("%s", repair_err.text);
+        assert_int_equal(file.n_kept, REPAIR_POINTS);
+        assert_int_equal(got.len, n);
+        assert_memory_equal(got.data + begin_of(&got), longer.data + begin_of(&got), n - begin_of(&got));
+        free(got.data);
+        free(longer.data);
+        if (is_las) continue;
+        /* A header that is written again as names come counts the points of that moment. */
+        uint8_t *digit = memmem(repair_left[i].data, repair_left[i].len, count, sizeof count - 1);
+        digit += sizeof count - 1;
+        const uint8_t was = *digit;
+        *digit = '3';
+        assert_int_equal(repair(repair_left[i].data, repair_left[i].len, &file, &got), 1);
+        assert_int_equal(file.n_kept, REPAIR_POINTS);
+        free(got.data);
+        *digit = was;
+    }
+}
+
 /* A file of another format with that ending is not touched. */
 static void test_other_format(void **state)
 {
@@ -300,6 +333,7 @@ int main(void)
         cmocka_unit_test(test_cut_whole),
         cmocka_unit_test(test_damaged),
         cmocka_unit_test(test_zeros),
+        cmocka_unit_test(test_zeros_after_a_whole_file),
         cmocka_unit_test(test_other_format),
         cmocka_unit_test(test_huge_numbers),
         cmocka_unit_test(test_damage_within_text),

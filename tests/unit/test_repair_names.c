@@ -243,10 +243,10 @@ static void test_large_capture(void **state)
     assert_int_equal(unlink(repair_path), 0);
 }
 
+/* ctx: how many questions are answered with no before that; NULL: none. */
 static int stop(void *ctx)
 {
-    (void)ctx;
-    return 1;
+    return ctx == NULL || --*(int *)ctx < 0;
 }
 
 /* A repair that is given up leaves the file as it was. */
@@ -262,6 +262,28 @@ static void test_stopped(void **state)
         struct bytes got = repair_slurp(repair_part);
         assert_int_equal(got.len, repair_left[i].len - 1);
         assert_memory_equal(got.data, repair_left[i].data, got.len);
+        free(got.data);
+        unlink(repair_part);
+    }
+}
+
+/* A power cut can leave a file of zeros that is long: their search can be stopped, too, at each block of 1 MiB. */
+static void test_search_for_zeros_is_stopped(void **state)
+{
+    (void)state;
+    for (int k = 0; k < 2; k++) {
+        int n_before = 4;
+        const int i = k == 0 ? REPAIR_LAS : 2; /* the latter is binary PLY */
+        const struct sh_report report = {.stop = stop, .ctx = &n_before};
+        struct repaired file;
+        repair_name(repair_formats[i].name);
+        repair_write_file(repair_part, repair_left[i].data, repair_left[i].len);
+        assert_int_equal(truncate(repair_part, 8 << 20), 0);
+        assert_int_equal(repair_file(repair_path, &report, &file, &repair_err), SH_ESTOPPED);
+        assert_int_equal(access(repair_path, F_OK), -1);
+        struct bytes got = repair_slurp(repair_part);
+        assert_int_equal(got.len, 8 << 20);
+        assert_memory_equal(got.data, repair_left[i].data, repair_left[i].len);
         free(got.data);
         unlink(repair_part);
     }
@@ -405,6 +427,7 @@ int main(void)
                                        cmocka_unit_test(test_full_for_a_while),
                                        cmocka_unit_test(test_broken_disk),
                                        cmocka_unit_test(test_stopped),
+                                       cmocka_unit_test(test_search_for_zeros_is_stopped),
                                        cmocka_unit_test(test_bytes_between_frames),
                                        cmocka_unit_test(test_several_blocks),
                                        cmocka_unit_test(test_large_capture),

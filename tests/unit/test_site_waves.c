@@ -272,6 +272,11 @@ static void a_pulse_of_another_width_is_told(void **state)
     expect_warned(FROM_FILE ", echoes: gaussians", "ns wide", 0);
     write_pulse("t_ns,power\n0,0\n2,1\n4,2\n6,1\n8,0\n");
     expect_warned(FROM_FILE, "ns wide", 0);
+    /* A table that begins or ends above half has its width up to there: from 0 to 20, and half of the last step. */
+    write_pulse("t_ns,power\n0,3\n10,2.5\n20,4\n30,0\n");
+    expect_warned(FROM_FILE, "the pulse is 25 ns wide", 1);
+    write_pulse("t_ns,power\n0,0\n10,4\n20,2.5\n30,3\n");
+    expect_warned(FROM_FILE, "the pulse is 25 ns wide", 1);
 }
 
 /* ---- blocks and the plan */

@@ -64,6 +64,21 @@ static int is_there(const char *path, size_t n, const char *ending)
     return there;
 }
 
+static size_t len_of_file(const char *path)
+{
+    return strlen(path) - (app_ends_in(path, ".part") ? strlen(".part") : 0);
+}
+
+/* Whether an earlier --repair names FILE or FILE.part, too. One repair follows the other, so that is allowed. */
+static int is_named_before(const struct record_line *r, int i)
+{
+    const size_t n = len_of_file(r->repair[i]);
+    int k = 0;
+    while (k < i && (len_of_file(r->repair[k]) != n || strncmp(r->repair[k], r->repair[i], n) != 0))
+        k++;
+    return k < i;
+}
+
 /* FILE is the file that a repair makes of FILE.part, which it also takes as its operand. X.wdp is the file of waveforms
  * that it makes of X.wdp.part. A repair replaces nothing: where these are there, it reads them. */
 int record_line_add_repaired(struct record_line *r)
@@ -72,6 +87,7 @@ int record_line_add_repaired(struct record_line *r)
     int status = APP_OK;
     for (int i = 0; i < r->n_repairs && status == APP_OK; i++) {
         const char *path = r->repair[i];
+        if (is_named_before(r, i)) continue;
         const size_t n_part = app_ends_in(path, part) ? strlen(part) : 0, n_las = n_part + strlen(las);
         const int is_las = app_ends_in(path, n_part != 0 ? ".las.part" : las);
         const struct app_file is = {.option = "repair", .path = path, .n_ending = n_part, .use = APP_READS};
