@@ -174,7 +174,7 @@ static int has_news(const struct usb_link *self, uint32_t want_write)
 /* Returns timeout_ms, or less where the back end has something to do before. */
 static int wait_ms(const struct usb_link *self, int timeout_ms)
 {
-    const int64_t due_ns = self->ops->due_ns != NULL ? self->ops->due_ns(self->backend) : INT64_MAX;
+    const int64_t due_ns = self->ops->due_ns(self->backend);
     if (due_ns == INT64_MAX) return timeout_ms;
     const int64_t ms = (due_ns - monotonic_ns()) / 1000000 + 1;
     if (ms <= 0) return 0;

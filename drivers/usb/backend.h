@@ -61,8 +61,7 @@ struct usb_backend_ops {
      * usb_device_read. */
     void (*flush)(void *backend);
 
-    /* Monotonic time, in ns, at which handle() has work though no descriptor is ready; INT64_MAX: never. The
-     * member itself is NULL for a back end that never has. */
+    /* Monotonic time, in ns, at which handle() has work though no descriptor is ready; INT64_MAX: never. */
     int64_t (*due_ns)(const void *backend);
 
     /* Injected faults. `faults`: USB_CAN_… of those that the device core makes and that reach the host through this

@@ -42,7 +42,7 @@ static void take_apart(struct functionfs *self)
     gadget_unbind(&self->gadget);
     usb_device_detach(self->device);
     ffs_pipes_close(&self->pipes);
-    ffs_console_close(&self->console);
+    ffs_console_stop(&self->console);
     if (self->ep0 >= 0) close(self->ep0);
     gadget_remove(&self->gadget);
     free(self);
@@ -54,7 +54,7 @@ static int functionfs_open(const struct usb_backend_spec *spec, struct usb_devic
     struct functionfs *self = calloc(1, sizeof *self);
     if (self == NULL) return sh_fail(err, SH_ENOMEM, "functionfs: no memory");
     self->device = device;
-    self->ep0 = self->pipes.event_fd = self->console.fd = self->console.timer = -1;
+    self->ep0 = self->pipes.event_fd = self->console.fd = -1;
     int rc = gadget_create(&self->gadget, usb_facts(device)->model, &usb_facts(device)->id, err);
     if (rc == SH_OK && gadget_has_functionfs(&self->gadget)) rc = open_ep0(self, err);
     if (rc == SH_OK) rc = ffs_pipes_open(&self->pipes, device, &self->gadget, err);
@@ -77,7 +77,7 @@ static void functionfs_endpoint(const void *backend, char *buf, size_t len)
     snprintf(buf, len, "functionfs:%s", self->udc);
 }
 
-enum { AT_EP0, AT_AIO, AT_TTY, AT_TIMER, N_FDS };
+enum { AT_EP0, AT_AIO, AT_TTY, N_FDS };
 
 static int functionfs_prepare(void *backend, struct pollfd *fds)
 {
@@ -87,7 +87,6 @@ static int functionfs_prepare(void *backend, struct pollfd *fds)
                                  : (struct pollfd){.fd = self->gadget.state_fd, .events = POLLPRI};
     fds[AT_AIO] = (struct pollfd){.fd = self->pipes.event_fd, .events = POLLIN};
     fds[AT_TTY] = (struct pollfd){.fd = tty != 0 ? self->console.fd : -1, .events = tty};
-    fds[AT_TIMER] = (struct pollfd){.fd = self->console.timer, .events = POLLIN};
     return N_FDS;
 }
 
@@ -237,8 +236,7 @@ static int functionfs_handle(void *backend, const struct pollfd *fds, int n, con
         any = going && (functionfs_take_event(self) || taken == MAX_TAKEN);
         going = going && owner->go_on(owner->ctx);
     }
-    if (going && (fds[AT_TTY].fd == self->console.fd || fds[AT_TIMER].revents != 0))
-        ffs_console_handle(&self->console, fds[AT_TTY].fd >= 0 ? fds[AT_TTY].revents : 0, fds[AT_TIMER].revents != 0);
+    if (going) ffs_console_handle(&self->console, fds[AT_TTY].fd == self->console.fd ? fds[AT_TTY].revents : 0);
     self->backlog = !going || any;
     functionfs_flush(self);
     return SH_OK;
@@ -248,6 +246,12 @@ static int functionfs_more(const void *backend)
 {
     const struct functionfs *self = backend;
     return self->backlog;
+}
+
+static int64_t functionfs_due_ns(const void *backend)
+{
+    const struct functionfs *self = backend;
+    return self->console.look_ns;
 }
 
 /* ---- injected faults */
@@ -293,6 +297,7 @@ const struct usb_backend_ops usb_backend_functionfs = {
     .handle = functionfs_handle,
     .more = functionfs_more,
     .flush = functionfs_flush,
+    .due_ns = functionfs_due_ns,
     .faults = USB_CAN_SHORTEN,
     .fault = functionfs_fault,
     .close = functionfs_close,

@@ -6,16 +6,16 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/ioctl.h>
-#include <sys/timerfd.h>
 #include <termios.h>
 #include <unistd.h>
 
 #include "core/bytes.h"
+#include "core/monotonic.h"
 #include "drivers/protocol/native_encode.h"
 #include "drivers/usb/functionfs_private.h"
 #include "drivers/usb/head_device.h"
 
-static const struct itimerspec every_second = {{1, 0}, {1, 0}}, never = {{0, 0}, {0, 0}};
+enum { LOOK_EVERY_NS = 1000000000 };
 
 static void tty_path(const struct ffs_console *console, char *path, size_t len)
 {
@@ -28,14 +28,13 @@ int ffs_console_open(struct ffs_console *console, struct usb_device *device, int
     memset(console, 0, sizeof *console);
     console->device = device;
     console->number = number;
-    console->fd = console->timer = -1;
+    console->fd = -1;
+    console->look_ns = INT64_MAX;
     if (number < 0) return SH_OK;
     tty_path(console, path, sizeof path);
     if (access(path, R_OK | W_OK) != 0)
         return sh_fail(err, errno == EACCES ? SH_EPERM : SH_EIO, "functionfs: console %s: %s%s", path, strerror(errno),
                        errno == ENOENT ? "; is devtmpfs mounted on /dev?" : "");
-    console->timer = timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC);
-    if (console->timer < 0) return sh_fail(err, SH_EIO, "functionfs: timerfd: %s", strerror(errno));
     return SH_OK;
 }
 
@@ -84,9 +83,9 @@ static void write_tx(struct ffs_console *console)
  * closed. Bytes that are not in the tty yet are then dropped. */
 static void look_at_host(struct ffs_console *console)
 {
-    uint64_t count;
     int waiting = 0;
-    if (read(console->timer, &count, sizeof count) < 0 || ioctl(console->fd, TIOCOUTQ, &waiting) != 0) return;
+    console->look_ns = monotonic_ns() + LOOK_EVERY_NS;
+    if (ioctl(console->fd, TIOCOUTQ, &waiting) != 0) return;
     const uint64_t taken = console->written - (uint64_t)waiting;
     const int stuck = taken == console->taken && (waiting > 0 || console->tx_pos < console->tx_len);
     console->taken = taken;
@@ -125,7 +124,7 @@ void ffs_console_start(struct ffs_console *console)
     console->tx_len = console->tx_pos = console->lead_len = console->lead_pos = 0;
     console->written = console->taken = 0;
     console->cut = 0;
-    timerfd_settime(console->timer, 0, &every_second, NULL);
+    console->look_ns = monotonic_ns() + LOOK_EVERY_NS;
     offer_tx(console);
 }
 
@@ -135,7 +134,7 @@ void ffs_console_stop(struct ffs_console *console)
     if (console->fd >= 0) close(console->fd);
     console->fd = -1;
     console->session = 0;
-    if (console->timer >= 0) timerfd_settime(console->timer, 0, &never, NULL);
+    console->look_ns = INT64_MAX;
 }
 
 short ffs_console_events(const struct ffs_console *console)
@@ -158,12 +157,12 @@ static void read_rx(struct ffs_console *console)
     usb_device_submit(console->device, &console->rx);
 }
 
-void ffs_console_handle(struct ffs_console *console, short revents, int timed_out)
+void ffs_console_handle(struct ffs_console *console, short revents)
 {
     if (console->fd < 0) return;
     if ((revents & POLLIN) != 0 && !console->rx_busy) read_rx(console);
     if ((revents & POLLOUT) != 0) write_tx(console);
-    if (timed_out) look_at_host(console);
+    if (monotonic_ns() >= console->look_ns) look_at_host(console);
 }
 
 int ffs_console_complete(struct ffs_console *console, struct usb_transfer *transfer)
@@ -179,11 +178,4 @@ int ffs_console_complete(struct ffs_console *console, struct usb_transfer *trans
     console->tx_pos = 0;
     write_tx(console);
     return 1;
-}
-
-void ffs_console_close(struct ffs_console *console)
-{
-    ffs_console_stop(console);
-    if (console->timer >= 0) close(console->timer);
-    console->timer = -1;
 }

@@ -74,8 +74,8 @@ uint8_t ffs_pipes_address(const struct ffs_pipes *pipes, unsigned number);
  * frame, from which on it reads frames and replies correctly. */
 struct ffs_console {
     struct usb_device *device;
-    int fd;    /* of the tty; -1: not plugged in, or no console */
-    int timer; /* timerfd; -1: no console */
+    int fd;          /* of the tty; -1: not plugged in, or no console */
+    int64_t look_ns; /* monotonic time of the next look at the host; INT64_MAX: none */
     int number;
     int rx_busy, tx_at_core, session;
     uint32_t tx_len, tx_pos;
@@ -95,11 +95,10 @@ void ffs_console_start(struct ffs_console *console);
 void ffs_console_stop(struct ffs_console *console);
 /* Returns the events of poll(2) to wait for on fd. */
 short ffs_console_events(const struct ffs_console *console);
-/* Moves bytes between the tty and the core. timed_out: the timer has expired. */
-void ffs_console_handle(struct ffs_console *console, short revents, int timed_out);
+/* Moves bytes between the tty and the core, and looks at the host when it is time. */
+void ffs_console_handle(struct ffs_console *console, short revents);
 /* The core gives a transfer back. Returns 0: it is not one of the console. */
 int ffs_console_complete(struct ffs_console *console, struct usb_transfer *transfer);
-void ffs_console_close(struct ffs_console *console);
 
 /* ---- the back end */
 

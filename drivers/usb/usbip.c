@@ -73,14 +73,13 @@ static int usbip_open(const struct usb_backend_spec *spec, struct usb_device *de
     struct usbip *self = calloc(1, sizeof *self);
     if (self == NULL) return sh_fail(err, SH_ENOMEM, "usbip: no memory");
     self->device = device;
-    self->listener = self->retry.timer = self->reserve = -1;
+    self->listener = self->reserve = -1;
+    usb_retry_init(&self->retry, spec->retry_ms);
     for (int i = 0; i < MAX_CONNS; i++)
         self->conn[i].fd = -1;
     self->here = spec->attach;
-    int rc = self->here ? usb_retry_open(&self->retry, "usbip", spec->retry_ms, err) : listen_here(self, spec, err);
-    if (rc == SH_OK && self->here) rc = attach_here(self, err);
+    int rc = self->here ? attach_here(self, err) : listen_here(self, spec, err);
     if (rc != SH_OK) {
-        usb_retry_close(&self->retry);
         free(self);
         return rc;
     }
@@ -97,7 +96,7 @@ static void usbip_endpoint(const void *backend, char *buf, size_t len)
         snprintf(buf, len, "usbip:%s", self->at);
 }
 
-enum { AT_LISTENER = MAX_CONNS, AT_RETRY, N_FDS };
+enum { AT_LISTENER = MAX_CONNS, N_FDS };
 
 static int usbip_prepare(void *backend, struct pollfd *fds)
 {
@@ -109,7 +108,6 @@ static int usbip_prepare(void *backend, struct pollfd *fds)
         if (conn->out_first != NULL) fds[i].events |= POLLOUT;
     }
     fds[AT_LISTENER] = (struct pollfd){.fd = self->listener, .events = POLLIN};
-    fds[AT_RETRY] = (struct pollfd){.fd = self->retry.timer, .events = POLLIN};
     return N_FDS;
 }
 
@@ -152,25 +150,24 @@ static void say_why(const struct usbip_conn *conn, const struct usb_owner *owner
     owner->say(owner->ctx, text);
 }
 
-static int sweep(struct usbip *self, const struct usb_owner *owner)
+static void sweep(struct usbip *self, const struct usb_owner *owner)
 {
-    int rc = SH_OK;
     for (int i = 0; i < MAX_CONNS; i++) {
         if (self->conn[i].fd < 0 || !self->conn[i].broken) continue;
-        if (self->here && !self->unplugged) rc = usb_retry_start(&self->retry, owner);
+        if (self->here && !self->unplugged) usb_retry_start(&self->retry, owner);
         say_why(&self->conn[i], owner);
         usbip_conn_end(&self->conn[i]);
     }
-    return rc;
 }
 
-static int attach_again(struct usbip *self, const struct usb_owner *owner)
+static void attach_again(struct usbip *self, const struct usb_owner *owner)
 {
     struct sh_err err = {0, ""};
     const int is_attached = self->conn[0].fd >= 0; /* the end of an injected fault has plugged it in meanwhile */
-    if (is_attached || attach_here(self, &err) == SH_OK) return usb_retry_done(&self->retry, owner);
-    usb_retry_failed(&self->retry, err.text, owner);
-    return SH_OK;
+    if (is_attached || attach_here(self, &err) == SH_OK)
+        usb_retry_done(&self->retry, owner);
+    else
+        usb_retry_failed(&self->retry, err.text, owner);
 }
 
 static void usbip_flush(void *backend)
@@ -206,17 +203,16 @@ static int usbip_handle(void *backend, const struct pollfd *fds, int n, const st
     for (int i = 0; i < MAX_CONNS; i++)
         if (self->conn[i].fd >= 0) usbip_conn_answer_slow(&self->conn[i], owner);
     if (fds[AT_LISTENER].fd >= 0 && fds[AT_LISTENER].revents != 0) usbip_welcome(self, owner);
-    int rc = SH_OK;
-    if (fds[AT_RETRY].fd >= 0 && usb_retry_is_due(&self->retry, fds[AT_RETRY].revents) && !self->unplugged)
-        rc = attach_again(self, owner);
+    if (usb_retry_is_due(&self->retry) && !self->unplugged) attach_again(self, owner);
     usbip_flush(self);
-    return rc == SH_OK ? sweep(self, owner) : rc;
+    sweep(self, owner);
+    return SH_OK;
 }
 
 static int64_t usbip_due_ns(const void *backend)
 {
     const struct usbip *self = backend;
-    int64_t due_ns = INT64_MAX;
+    int64_t due_ns = self->retry.due_ns;
     for (int i = 0; i < MAX_CONNS; i++)
         if (usb_due_ns(self->conn[i].held) < due_ns) due_ns = usb_due_ns(self->conn[i].held);
     return due_ns;
@@ -266,7 +262,6 @@ static void usbip_close(void *backend)
     }
     if (self->listener >= 0) close(self->listener);
     if (self->reserve >= 0) close(self->reserve);
-    usb_retry_close(&self->retry);
     free(self);
 }
 

@@ -110,20 +110,22 @@ static void usbredir_stop(struct usbredir *self)
 }
 
 /* The attempt to connect self->fd has ended. error: 0, or the errno of its failure. */
-static int end_connect(struct usbredir *self, int error)
+static void end_connect(struct usbredir *self, int error)
 {
-    if (error == 0 && usbredir_start(self, self->fd) == SH_OK) return usb_retry_done(&self->retry, self->owner);
+    if (error == 0 && usbredir_start(self, self->fd) == SH_OK) {
+        usb_retry_done(&self->retry, self->owner);
+        return;
+    }
     usb_retry_failed(&self->retry, error != 0 ? strerror(error) : "no memory", self->owner);
     usbredir_stop(self);
-    return SH_OK;
 }
 
-static int connect_again(struct usbredir *self)
+static void connect_again(struct usbredir *self)
 {
-    if (self->fd >= 0) return SH_OK; /* the attempt before is still under way */
+    if (self->fd >= 0) return; /* the attempt before is still under way */
     int error = usb_backend_connect(&self->peer, &self->fd);
     if (error == 0) error = usb_backend_connect_error(self->fd);
-    return error == EINPROGRESS ? SH_OK : end_connect(self, error);
+    if (error != EINPROGRESS) end_connect(self, error);
 }
 
 static void usbredir_welcome(struct usbredir *self)
@@ -168,10 +170,9 @@ static int open_socket(struct usbredir *self, const struct usb_backend_spec *spe
         return SH_OK;
     }
     usb_backend_peer(spec, fd, &self->peer);
-    rc = usb_retry_open(&self->retry, "usbredir", spec->retry_ms, err);
-    if (rc == SH_OK && usbredir_start(self, fd) != SH_OK) rc = sh_fail(err, SH_ENOMEM, "usbredir: no memory");
-    if (rc != SH_OK) close(fd);
-    return rc;
+    if (usbredir_start(self, fd) == SH_OK) return SH_OK;
+    close(fd);
+    return sh_fail(err, SH_ENOMEM, "usbredir: no memory");
 }
 
 static int usbredir_open(const struct usb_backend_spec *spec, struct usb_device *device, void **backend,
@@ -180,10 +181,10 @@ static int usbredir_open(const struct usb_backend_spec *spec, struct usb_device 
     struct usbredir *self = calloc(1, sizeof *self);
     if (self == NULL) return sh_fail(err, SH_ENOMEM, "usbredir: no memory");
     self->device = device;
-    self->listener = self->fd = self->retry.timer = self->reserve = -1;
+    self->listener = self->fd = self->reserve = -1;
+    usb_retry_init(&self->retry, spec->retry_ms);
     int rc = open_socket(self, spec, err);
     if (rc != SH_OK) {
-        usb_retry_close(&self->retry);
         free(self);
         return rc;
     }
@@ -197,7 +198,7 @@ static void usbredir_endpoint(const void *backend, char *buf, size_t len)
     snprintf(buf, len, "%s", self->name);
 }
 
-enum { AT_GUEST, AT_LISTENER, AT_RETRY, N_FDS };
+enum { AT_GUEST, AT_LISTENER, N_FDS };
 
 static int usbredir_prepare(void *backend, struct pollfd *fds)
 {
@@ -206,7 +207,6 @@ static int usbredir_prepare(void *backend, struct pollfd *fds)
     if (self->parser == NULL || usbredirparser_has_data_to_write(self->parser) > 0) fds[AT_GUEST].events |= POLLOUT;
     if (self->parser != NULL && !is_full(self)) fds[AT_GUEST].events |= POLLIN;
     fds[AT_LISTENER] = (struct pollfd){.fd = self->greeted ? -1 : self->listener, .events = POLLIN};
-    fds[AT_RETRY] = (struct pollfd){.fd = self->retry.timer, .events = POLLIN};
     return N_FDS;
 }
 
@@ -231,30 +231,29 @@ static void say_why(const struct usbredir *self)
 static int usbredir_handle(void *backend, const struct pollfd *fds, int n, const struct usb_owner *owner)
 {
     struct usbredir *self = backend;
-    int rc = SH_OK;
     if (n != N_FDS) return SH_OK;
     self->owner = owner;
     self->n_reads = 0;
     if (self->fd >= 0 && self->parser == NULL && fds[AT_GUEST].revents != 0)
-        rc = end_connect(self, usb_backend_connect_error(self->fd));
+        end_connect(self, usb_backend_connect_error(self->fd));
     else if (self->parser != NULL && (fds[AT_GUEST].revents & ~POLLOUT) != 0)
         read_packets(self);
     if (!self->greeted && fds[AT_LISTENER].fd >= 0 && fds[AT_LISTENER].revents != 0) usbredir_welcome(self);
-    if (rc == SH_OK && fds[AT_RETRY].fd >= 0 && usb_retry_is_due(&self->retry, fds[AT_RETRY].revents))
-        rc = connect_again(self);
+    if (usb_retry_is_due(&self->retry)) connect_again(self);
     usbredir_answer_slow(self);
     usbredir_flush(self);
-    if (!self->broken) return rc;
-    if (self->listener < 0 && rc == SH_OK) rc = usb_retry_start(&self->retry, self->owner);
+    if (!self->broken) return SH_OK;
+    if (self->listener < 0) usb_retry_start(&self->retry, self->owner);
     say_why(self);
     usbredir_stop(self);
-    return rc;
+    return SH_OK;
 }
 
 static int64_t usbredir_due_ns(const void *backend)
 {
     const struct usbredir *self = backend;
-    return usb_due_ns(self->held);
+    const int64_t held_ns = usb_due_ns(self->held);
+    return held_ns < self->retry.due_ns ? held_ns : self->retry.due_ns;
 }
 
 /* ---- injected faults. The channel to the virtual machine stays: the device alone is unplugged from it. */
@@ -307,7 +306,6 @@ static void usbredir_close(void *backend)
     remove_path(self);
     if (self->listener >= 0) close(self->listener);
     if (self->reserve >= 0) close(self->reserve);
-    usb_retry_close(&self->retry);
     free(self);
 }
 

@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* These tests run the console of a gadget, with a socket pair in place of the kernel's tty, and an eventfd in place of
- * the timer. A socket pair also reports how much was not taken yet (TIOCOUTQ is SIOCOUTQ). Clients stop reading, and
- * others come after them. */
+/* These tests run the console of a gadget, with a socket pair in place of the kernel's tty. A second passes where a
+ * look at the host is due at once. A socket pair also reports how much was not taken yet (TIOCOUTQ is SIOCOUTQ).
+ * Clients stop reading, and others come after them. */
 #include "tests/unit/usb_host.h"
 
 #include <netinet/in.h>
 #include <poll.h>
-#include <sys/eventfd.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -48,7 +47,7 @@ static int open_port_on(void **state, const int pair[2])
     port.console.device = port.head.device;
     port.console.fd = pair[0];
     port.host = pair[1];
-    port.console.timer = eventfd(0, EFD_NONBLOCK);
+    port.console.look_ns = INT64_MAX;
     usb_device_attach(port.head.device, USB_RATE_HIGH, on_complete, &port);
     control(&port, 0x00, USB_REQ_SET_ADDRESS, 5);
     control(&port, 0x00, USB_REQ_SET_CONFIGURATION, 1);
@@ -97,7 +96,7 @@ static int close_port(void **state)
 {
     struct port *port = *state;
     usb_device_free(port->head.device); /* it frees the waiting bytes */
-    ffs_console_close(&port->console);
+    ffs_console_stop(&port->console);
     close(port->host);
     return 0;
 }
@@ -108,7 +107,7 @@ static void client_says(struct port *port, const char *text)
     char heard[64];
     const size_t len = strlen(text);
     assert_int_equal(write(port->host, text, len), len);
-    ffs_console_handle(&port->console, POLLIN, 0);
+    ffs_console_handle(&port->console, POLLIN);
     assert_int_equal(usb_device_read(port->head.device, CONSOLE_OUT, heard, sizeof heard), len);
     assert_memory_equal(heard, text, len);
     assert_int_equal(port->head.session[CONSOLE].open, 1);
@@ -116,14 +115,15 @@ static void client_says(struct port *port, const char *text)
 
 static void second_passes(struct port *port)
 {
-    const uint64_t one = 1;
-    assert_int_equal(write(port->console.timer, &one, sizeof one), sizeof one);
-    ffs_console_handle(&port->console, 0, 1);
+    port->console.look_ns = 0;
+    ffs_console_handle(&port->console, 0);
+    assert_true(port->console.look_ns > 0); /* the next look */
+    port->console.look_ns = INT64_MAX;
 }
 
 static size_t head_says(struct port *port, const void *text, size_t len)
 {
-    ffs_console_handle(&port->console, POLLOUT, 0); /* as poll(2) has it where there is room */
+    ffs_console_handle(&port->console, POLLOUT); /* as poll(2) has it where there is room */
     return usb_device_write(port->head.device, CONSOLE_IN, text, len);
 }
 
@@ -147,7 +147,7 @@ static size_t client_reads(struct port *port, void *bytes, size_t room)
     while (len < room && n > 0) {
         n = recv(port->host, (char *)bytes + len, room - len, MSG_DONTWAIT);
         if (n > 0) len += (size_t)n;
-        ffs_console_handle(&port->console, ffs_console_events(&port->console) & POLLOUT, 0);
+        ffs_console_handle(&port->console, ffs_console_events(&port->console) & POLLOUT);
     }
     return len;
 }
@@ -160,14 +160,14 @@ static void a_head_that_does_not_read_holds_back(void **state)
     struct port *port = *state;
     char heard[64];
     assert_int_equal(write(port->host, "first", 5), 5);
-    ffs_console_handle(&port->console, POLLIN, 0);
+    ffs_console_handle(&port->console, POLLIN);
     assert_int_equal(ffs_console_events(&port->console), 0);
     assert_int_equal(write(port->host, "second", 6), 6);
-    ffs_console_handle(&port->console, POLLIN, 0);
+    ffs_console_handle(&port->console, POLLIN);
     assert_int_equal(usb_device_read(port->head.device, CONSOLE_OUT, heard, sizeof heard), 5);
     assert_memory_equal(heard, "first", 5);
     assert_int_equal(ffs_console_events(&port->console), POLLIN);
-    ffs_console_handle(&port->console, POLLIN, 0);
+    ffs_console_handle(&port->console, POLLIN);
     assert_int_equal(usb_device_read(port->head.device, CONSOLE_OUT, heard, sizeof heard), 6);
     assert_memory_equal(heard, "second", 6);
 }
@@ -302,11 +302,11 @@ static void a_missing_tty_is_reported(void **state)
     assert_string_equal(err.text,
                         "functionfs: console /dev/ttyGS987654: No such file or directory; is devtmpfs mounted "
                         "on /dev?");
-    ffs_console_close(&console);
+    ffs_console_stop(&console);
     assert_int_equal(ffs_console_open(&console, NULL, -1, &err), SH_OK); /* a device without a console */
     ffs_console_start(&console);
     assert_int_equal(console.fd, -1);
-    ffs_console_close(&console);
+    ffs_console_stop(&console);
 }
 
 int main(void)

@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "core/bytes.h"
+#include "core/monotonic.h"
 #include "drivers/usb/backend.h"
 #include "drivers/usb/functionfs_private.h"
 #include "drivers/usb/head_device.h"
@@ -281,8 +282,11 @@ static void test_port_alone(void **state)
     set_state("configured\n");
     handle(0, 0);
     assert_int_equal(usb_facts(head.device)->configuration, 0); /* no change was reported */
+    assert_int_equal(ops->due_ns(backend), INT64_MAX);
+    const int64_t from_ns = monotonic_ns();
     handle(POLLPRI | POLLERR, 0);
     assert_int_equal(usb_facts(head.device)->configuration, 1);
+    assert_in_range(ops->due_ns(backend), from_ns + 1000000000, monotonic_ns() + 1000000000); /* a look at the host */
     const uint32_t first = usb_facts(head.device)->attaches;
     set_state("suspended\n");
     handle(POLLPRI, 0);
