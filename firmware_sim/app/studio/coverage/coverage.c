@@ -153,7 +153,7 @@ static int open_all(struct coverage_run *r, struct sh_err *err)
     if (rc == SH_OK && r->output != NULL)
         rc = mesh_check_box(r->output, r->site->scene->min_m, r->site->scene->max_m, err);
     if (rc != SH_OK) return rc;
-    r->result.base = r->site->stop != NULL ? 0 : r->cfg->head.settings.station - 1;
+    r->result.base = r->cfg->head.settings.station - 1;
     const struct coverage_spec spec = {.bvh = r->site->bvh,
                                        .silent = r->site->silent,
                                        .cell_m = r->cfg->coverage.cell_m,
