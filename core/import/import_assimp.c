@@ -36,8 +36,8 @@ struct import {
     bool is_mirrored;         /* the levels mirror the mesh at hand */
     struct import_uv uv;      /* of the mesh at hand */
     unsigned n_turned;        /* meshes whose texture is turned */
-    unsigned n_boned;         /* meshes that bones move */
-    unsigned n_morphed;       /* meshes with morph targets */
+    unsigned n_boned;         /* parts of meshes, one for each material, that bones move */
+    unsigned n_morphed;       /* parts with morph targets */
     double largest;           /* |coordinate| at any level, file units */
     double error;             /* of a coordinate once it is placed, file units */
     uint64_t n_faces, n_done; /* for the progress */
@@ -276,15 +276,20 @@ static const struct aiScene *import_file(const struct assimp_lib *lib, struct sc
     return in;
 }
 
-/* Assimp (5.2) ends with an assertion where a Collada node has a skew. */
-static int check_skew(struct scene_build *b, struct sh_err *err)
+/* Assimp (5.2) ends with an assertion where a Collada node has a skew. It finds no geometry in a <morph>. */
+static int check_collada(struct scene_build *b, struct sh_err *err)
 {
     struct text t;
     if (!text_has_ending(b->spec->file, ".dae")) return SH_OK;
     int rc = text_open(&t, b->spec->file, NULL, NULL, err);
-    const bool has = rc == SH_OK && memmem(t.data, t.size, "<skew", 5) != NULL;
+    const bool has_skew = rc == SH_OK && memmem(t.data, t.size, "<skew", 5) != NULL;
+    const bool has_morph = rc == SH_OK && memmem(t.data, t.size, "<morph", 6) != NULL;
     text_close(&t);
-    if (!has) return rc;
+    if (has_morph)
+        return build_fail(b, SH_EINPUT, err,
+                          "it has a <morph>, which Assimp can't read; allowed are meshes without morph targets: export "
+                          "it with the pose applied, or as glTF 2.0");
+    if (!has_skew) return rc;
     return build_fail(b, SH_EINPUT, err,
                       "it has a <skew>, which Assimp can't read; allowed are <matrix>, <translate>, <rotate>, <scale> "
                       "and <lookat>: write the same as a <matrix>, or convert it to .obj or .ply");
@@ -304,10 +309,11 @@ static void warn_movers(const struct import *im)
 {
     if (text_has_ending(im->b->spec->file, ".gltf") || text_has_ending(im->b->spec->file, ".glb")) return;
     if (im->n_boned > 0)
-        build_warn(im->b, "the bones of %u meshes are not applied: these meshes are read as if they had none",
+        build_warn(im->b, "the bones of %u parts of meshes are not applied: these are read as if they had none",
                    im->n_boned);
     if (im->n_morphed > 0)
-        build_warn(im->b, "the morph targets of %u meshes are not applied, whatever their weights", im->n_morphed);
+        build_warn(im->b, "the morph targets of %u parts of meshes are not applied, whatever their weights",
+                   im->n_morphed);
 }
 
 int import_assimp(struct scene_build *b, struct sh_err *err)
@@ -317,7 +323,7 @@ int import_assimp(struct scene_build *b, struct sh_err *err)
     struct stat st;
     /* Assimp's C interface reports no progress, so a message at the start says that a large file takes a while. */
     if (stat(b->spec->file, &st) == 0 && st.st_size > 8 << 20) build_report(b, -1);
-    int rc = check_skew(b, err);
+    int rc = check_collada(b, err);
     if (rc == SH_OK) rc = assimp_lib_load(&im.lib, err);
     if (rc != SH_OK) return rc;
     im.in = import_file(&im.lib, b, &log, err);

@@ -3,6 +3,7 @@
 #ifndef FIRMWARE_SIM_COMMAND_DECIMAL_H
 #define FIRMWARE_SIM_COMMAND_DECIMAL_H
 
+#include <stddef.h>
 #include <stdint.h>
 
 #include "firmware_sim/command/command.h"
@@ -25,5 +26,9 @@ enum command_fit command_decimal_to_wide(const struct command_decimal *decimal, 
 enum command_fit command_decimal_to_int(const struct command_decimal *decimal, int shift, int64_t *value);
 /* Returns the nearest double. (strtod of the text would end at a blank within the number, as in "1 E2".) */
 double command_decimal_to_double(const struct command_decimal *decimal);
+
+enum { COMMAND_DOUBLE_LEN = 32 };
+/* Prints the fewest digits from 15 on that read back as the same number, as printf's %g does. Returns their length. */
+int command_print_double(char *text, size_t room, double value);
 
 #endif

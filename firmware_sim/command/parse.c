@@ -211,3 +211,12 @@ void command_clip(char clip[COMMAND_CLIP_LEN], const char *text, size_t len)
     const size_t n = whole ? len : utf8_cut(text, COMMAND_CLIP_LEN - 4);
     snprintf(clip, COMMAND_CLIP_LEN, "%.*s%s", (int)n, text, whole ? "" : "...");
 }
+
+int command_print_double(char *text, size_t room, double value)
+{
+    int digits = 15, n;
+    do
+        n = snprintf(text, room, "%.*g", digits, value);
+    while (strtod(text, NULL) != value && digits++ < 17);
+    return n;
+}

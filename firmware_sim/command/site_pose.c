@@ -52,8 +52,10 @@ static int site_pose_take_number(struct command_call *call, const struct part *p
     }
     *value = command_decimal_to_double(&decimal) + 0.0; /* without -0 */
     if (fabs(*value) <= part->most) return 0;
-    return command_fail(call, CMD_E_RANGE, "%s: %s %.9g, allowed %.10g to %.10g %s", call->row->header, part->name,
-                        *value, -part->most, part->most, part->unit[0] == 'M' ? "m" : "deg");
+    char text[COMMAND_DOUBLE_LEN];
+    command_print_double(text, sizeof text, *value);
+    return command_fail(call, CMD_E_RANGE, "%s: %s %s, allowed %.10g to %.10g %s", call->row->header, part->name, text,
+                        -part->most, part->most, part->unit[0] == 'M' ? "m" : "deg");
 }
 
 static int take_station(struct command_call *call, const char *field, size_t len, uint32_t *station)

@@ -170,9 +170,10 @@ void device_session_closed(void *self, uint32_t session, const char *who, int pa
  * (m), roll, pitch, heading (degrees). The platform moves evenly from one pose to the next, however far apart they are.
  * Before the first one the head is at its station (POSE_NONE); only in the pace step the first one holds before its
  * time, too. SH_EINPUT: the pose can't be used, which is counted. It is not later than the one before, out of reach,
- * before power-up, more than DEVICE_POSE_AHEAD_S ahead of device time (not in the pace step), or there are
- * DEVICE_POSES_KEPT that pulses still need, or a journal with poses is being replayed, up to its END. A pose over 2 s
- * ahead has no room, either, where the receiver's fixes need the poses of the last 2 s. */
+ * before power-up, or more than DEVICE_POSE_AHEAD_S ahead of device time (not in the pace step). SH_ESTATE: it can't be
+ * used now, which is counted, too. There are DEVICE_POSES_KEPT that pulses still need, or a journal with poses is being
+ * replayed, up to its END. A pose over 2 s ahead has no room, either, where the receiver's fixes need the poses of the
+ * last 2 s. */
 int device_pose(struct device *device, int64_t t_ns, const double v[6], struct sh_err *err);
 
 /* A command whose effect is COMMAND_MOVE has moved nothing yet. First call device_plan_move, in any thread.

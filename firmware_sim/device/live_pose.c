@@ -73,11 +73,11 @@ static int check_pose(const struct device *device, int64_t t_ns, const struct po
     if (!is_near(device, pose))
         return sh_fail(err, SH_EINPUT, "a pose is over %g m from the station", device->site->cfg->platform.reach_m);
     if (t_ns <= last_ns)
-        return sh_fail(err, SH_EINPUT, "a pose is not after the last pose, of %.9g s", 1e-9 * (double)last_ns);
+        return sh_fail(err, SH_EINPUT, "a pose is not after the last pose, of %.15g s", (double)last_ns / 1e9);
     if (t_ns < 0) return sh_fail(err, SH_EINPUT, "a pose is before power-up; allowed is 0 s on");
     if (is_early(device, t_ns)) return sh_fail(err, SH_EINPUT, "a pose is over %d s ahead", DEVICE_POSE_AHEAD_S);
     if (has_room(device, t_ns)) return SH_OK;
-    return sh_fail(err, SH_EINPUT, "a pose has no room: the %d that the head keeps are still needed; send it later",
+    return sh_fail(err, SH_ESTATE, "a pose has no room: the %d that the head keeps are still needed; send it later",
                    DEVICE_POSES_KEPT);
 }
 
@@ -109,7 +109,7 @@ int device_pose(struct device *device, int64_t t_ns, const double v[6], struct s
     int rc;
     pthread_mutex_lock(&device->lock);
     if (device_replays_poses(device)) {
-        rc = sh_fail(err, SH_EINPUT, "a pose came while a journal with poses is being replayed");
+        rc = sh_fail(err, SH_ESTATE, "a pose came while a journal with poses is being replayed");
         atomic_fetch_add(&device->counters.bad_poses, 1);
     } else {
         rc = take_pose(device, t_ns, v, err);

@@ -3,7 +3,6 @@
 
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "firmware_sim/command/decimal.h"
@@ -25,8 +24,10 @@ static int fail_form(int first, struct sh_err *err)
 static int check_limit(int i, double value, struct sh_err *err)
 {
     if (fabs(value) <= field[i].most) return SH_OK;
-    return sh_fail(err, SH_EINPUT, "%s of a pose is %.9g, allowed %.10g to %.10g %s", field[i].name, value,
-                   -field[i].most, field[i].most, field[i].unit);
+    char text[COMMAND_DOUBLE_LEN];
+    command_print_double(text, sizeof text, value);
+    return sh_fail(err, SH_EINPUT, "%s of a pose is %s, allowed %.10g to %.10g %s", field[i].name, text, -field[i].most,
+                   field[i].most, field[i].unit);
 }
 
 /* Reads the numbers of all fields from `first` on. The limits come last, so that a line of another form is called that.
@@ -66,21 +67,11 @@ int pose_line_read_timed(const char *line, double *t_s, double v[6], struct sh_e
     return SH_OK;
 }
 
-/* Prints the fewest digits that read back as the same number. */
-static int print_number(char *text, size_t room, double value)
-{
-    int digits = 15, n;
-    do
-        n = snprintf(text, room, "%.*g", digits, value);
-    while (strtod(text, NULL) != value && digits++ < 17);
-    return n;
-}
-
 void pose_line_write(const double v[6], char text[POSE_LINE_LEN])
 {
     int n = 0;
     for (int i = 0; i < 6; i++) {
         if (i > 0) text[n++] = ' ';
-        n += print_number(text + n, (size_t)(POSE_LINE_LEN - n), v[i]);
+        n += command_print_double(text + n, (size_t)(POSE_LINE_LEN - n), v[i]);
     }
 }

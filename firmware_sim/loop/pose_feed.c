@@ -48,7 +48,8 @@ static void pose_feed_take_line(struct pose_feed *feed, const char *line)
         atomic_fetch_add(&device_counters(feed->device)->bad_poses, 1);
     else
         rc = device_pose(feed->device, llround(1e9 * t_s), v, &err); /* counts it, too */
-    if (rc != SH_OK) report_bad(feed, rc == SH_EFORMAT ? CMD_E_DATA_TYPE : CMD_E_RANGE, err.text);
+    const int number = rc == SH_EFORMAT ? CMD_E_DATA_TYPE : rc == SH_ESTATE ? CMD_E_SETTINGS : CMD_E_RANGE;
+    if (rc != SH_OK) report_bad(feed, number, err.text);
 }
 
 static void take_datagram(struct pose_feed *feed)

@@ -48,14 +48,16 @@ static int plan_one(const struct site *site, struct georef *georef, const double
 
 /* Gives each stretch of the path a georeference of its own about the stretch's middle. So counts and polynomials
  * need not reach further than a stretch, however long the path is. */
-static int plan_stretches(const struct site *site, struct site_station *s, struct sh_err *err)
+static int plan_stretches(const struct site *site, struct site_station *s, const struct sh_report *report,
+                          struct sh_err *err)
 {
     struct plan_row row;
     s->on_stretch = calloc(site->n_stretches, sizeof *s->on_stretch);
     if (s->on_stretch == NULL) return sh_fail(err, SH_ENOMEM, "no memory for the path");
     for (size_t i = 0; i < site->n_stretches; i++) {
         const struct site_stretch *stretch = &site->stretch[i];
-        int rc = georef_recentre(s->georef, stretch->centre_m, &s->on_stretch[i].georef, err);
+        int rc = sh_check_stop(report, err);
+        if (rc == SH_OK) rc = georef_recentre(s->georef, stretch->centre_m, &s->on_stretch[i].georef, err);
         if (rc == SH_OK)
             rc = plan_one(site, s->on_stretch[i].georef, stretch->centre_m, reach_m(site, stretch), &row, err);
         if (rc != SH_OK) return rc;
@@ -69,15 +71,16 @@ static int plan_stretches(const struct site *site, struct site_station *s, struc
     return SH_OK;
 }
 
-/* report NULL: for a station with another scanner, whose own site gives the warnings. */
+/* A station with another scanner has its own site. That one gives the warnings and has the stretches. */
 static int plan_station(const struct site *site, struct site_station *s, const struct sh_report *report,
                         struct sh_err *err)
 {
     const struct config *cfg = site->cfg;
-    int by_stretch = site->n_knots != 0 && cfg->output.layout == LINE_GEO;
-    int rc = by_stretch ? plan_stretches(site, s, err)
+    const int serves = config_serves(cfg, (uint32_t)(s - site->station));
+    const int by_stretch = serves && site->n_knots != 0 && cfg->output.layout == LINE_GEO;
+    int rc = by_stretch ? plan_stretches(site, s, report, err)
                         : plan_one(site, s->georef, s->at.position_m, reach_m(site, NULL), &s->plan, err);
-    if (rc == SH_OK && s->plan.error_m > cfg->output.tolerance_m && cfg->output.layout == LINE_GEO)
+    if (rc == SH_OK && serves && s->plan.error_m > cfg->output.tolerance_m && cfg->output.layout == LINE_GEO)
         sh_warn(
             report,
             "station %s: the error of georeferencing by %s may be %.2g m, more than the %.2g m of output.tolerance_m",
@@ -233,7 +236,7 @@ static int add_georef(struct site *site, struct site_station *s, const struct sh
     if (epsg != first)
         sh_warn(report, "%s: station %s is in EPSG %d, station %s in %d: their points have no common system", cfg->file,
                 s->station->name, epsg, site->station[0].station->name, first);
-    return plan_station(site, s, config_serves(cfg, (uint32_t)(s - site->station)) ? report : NULL, err);
+    return plan_station(site, s, report, err);
 }
 
 int site_georeference(struct site *site, const struct sh_report *report, struct sh_err *err)

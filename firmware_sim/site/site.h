@@ -48,12 +48,13 @@ struct site_station {
     struct georef *georef;
     struct placement at;
     struct site_tripod tripod;
-    struct cast_beam *beam;             /* NULL: one ray per pulse */
-    struct beam_outlines *outlines;     /* of an adaptive beam */
-    double scale[3];                    /* of geo points on the wire, units of the CRS per count */
-    struct site_on_stretch *on_stretch; /* [n_stretches] of a trajectory, in the geo layout; else NULL */
-    struct plan_row plan;               /* how the georef's method was chosen; of the worst stretch */
-    struct cast_colour colour;          /* of its points; where output.colour is not none */
+    struct cast_beam *beam;         /* NULL: one ray per pulse */
+    struct beam_outlines *outlines; /* of an adaptive beam */
+    double scale[3];                /* of geo points on the wire, units of the CRS per count */
+    struct site_on_stretch
+        *on_stretch;      /* [n_stretches] of a trajectory, in the geo layout; else, or with another scanner, NULL */
+    struct plan_row plan; /* how the georef's method was chosen; of the worst stretch */
+    struct cast_colour colour; /* of its points; where output.colour is not none */
     double t_s, frame; /* of a stop: its time after the trajectory's first sample; the trajectory's frame scalar */
 };
 
@@ -162,7 +163,7 @@ struct site {
 };
 
 /* A path is cut into stretches whose poses are within this distance of a centre. In the geo layout loading takes about
- * 1 ms for each stretch, so the limit keeps it at 1 s. */
+ * 1 ms for each stretch and each station of the site's own scanner. So the limit keeps it at 1 s for one station. */
 #define SITE_STRETCH_M 1000.0
 enum { SITE_MAX_STRETCHES = 1024 };
 

@@ -281,6 +281,23 @@ static void the_nearest_word_is_meant(void **state)
     assert_string_equal(buf, "");
 }
 
+/* A command has nothing else to do for --quiet: its progress is that of these reports. */
+static void quiet_hides_progress(void **state)
+{
+    (void)state;
+    for (int quiet = 0; quiet < 2; quiet++) {
+        struct output output;
+        assert_int_equal(parse(quiet ? "a b --quiet" : "a b"), APP_GO_ON);
+        assert_int_equal(v.quiet, quiet);
+        output_take(&output, stderr);
+        sh_progress(&app_report_stderr, "planning", 0.0);
+        char *said = output_give(&output);
+        assert_string_equal(said, quiet ? "" : "scanhead: planning: 0 %\n");
+        free(said);
+    }
+    parse("a b");
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -289,6 +306,7 @@ int main(void)
         cmocka_unit_test(keys_are_settings),         cmocka_unit_test(lists_have_an_end),
         cmocka_unit_test(words_are_passed_on),       cmocka_unit_test(rows_are_taken_from_another_command),
         cmocka_unit_test(numbers_in_a_row),          cmocka_unit_test(the_nearest_word_is_meant),
+        cmocka_unit_test(quiet_hides_progress),
     };
     return cmocka_run_group_tests_name("app_parse", tests, NULL, NULL);
 }

@@ -350,6 +350,24 @@ static void repeated_poses_change_no_way(void **state)
     expect_way(&way, 1, 5 * S / 2, 25000, 10000);
 }
 
+/* Poses each 8 ms at 25 m/s, and ticks of 5 ms that each have the poses around them. At the start of each tick the path
+ * is 25 mm for each millisecond. */
+static void a_tick_between_poses_has_its_own_path(void **state)
+{
+    (void)state;
+    static const int64_t MS = 1000000;
+    struct cola_way way = {0};
+    for (int tick = 0; tick < 16; tick++) {
+        const int from_ms = 5 * tick, first = from_ms / 8, last = (from_ms + 5 + 7) / 8;
+        struct native_pose pose[3] = {0};
+        for (int i = first; i <= last; i++)
+            pose[i - first] = (struct native_pose){8 * i * MS, {0.2 * i, 0, 0}, {1, 0, 0, 0}, 0, 0, 0};
+        add_way(&way, 1, pose, (uint32_t)(last - first + 1));
+        expect_way(&way, 1, from_ms * MS, 25 * from_ms, 25000);
+        expect_way(&way, 1, (from_ms + 4) * MS, 25 * (from_ms + 4), 25000);
+    }
+}
+
 /* A frame of poses has one speed: its way, from the end of the frame before it, over its time. */
 static void a_way_has_one_speed_a_frame(void **state)
 {
@@ -405,8 +423,8 @@ int main(void)
         CASE(far_heads_count_in_two_millimetres), CASE(echoes_go_to_their_channels),
         CASE(signals_end_where_their_scale_ends), CASE(name_and_time_where_asked_for),
         CASE(the_encoder_counts_the_way),         CASE(a_way_ends_with_its_poses),
-        CASE(repeated_poses_change_no_way),       CASE(a_way_has_one_speed_a_frame),
-        CASE(the_longest_telegram_has_room),
+        CASE(repeated_poses_change_no_way),       CASE(a_tick_between_poses_has_its_own_path),
+        CASE(a_way_has_one_speed_a_frame),        CASE(the_longest_telegram_has_room),
     };
     return cmocka_run_group_tests_name("cola scan", tests, NULL, NULL);
 }

@@ -286,11 +286,29 @@ static void bones_and_morph_targets_are_reported(void **state)
     warn_of_movers("m.dae", text, NULL);
     snprintf(text, sizeof text, MOVED, once);
     warn_of_movers("m.dae", text,
-                   "m.dae: the bones of 1 meshes are not applied: these meshes are read as if they had none");
+                   "m.dae: the bones of 1 parts of meshes are not applied: these are read as if they had none");
     snprintf(twice, sizeof twice, "%s%s", once, once);
     snprintf(text, sizeof text, MOVED, twice);
-    warn_of_movers("m.dae", text, "the bones of 2 meshes are not applied");
-    warn_of_movers("m.fbx", MORPH, "m.fbx: the morph targets of 1 meshes are not applied, whatever their weights");
+    warn_of_movers("m.dae", text, "the bones of 2 parts of meshes are not applied");
+    warn_of_movers("m.fbx", MORPH,
+                   "m.fbx: the morph targets of 1 parts of meshes are not applied, whatever their weights");
+}
+
+/* Assimp would look for the geometry of a mesh in a controller with morph targets, used or not, and blame the file. */
+static void morph_targets_of_collada_are_refused(void **state)
+{
+    (void)state;
+    static const char *const uses[] = {"<instance_controller url=\"#m\"/>", "<instance_geometry url=\"#g\"/>"};
+    for (int i = 0; i < 2; i++) {
+        char text[8192], changed[8192];
+        snprintf(text, sizeof text, MOVED, uses[i]);
+        const char *at = strstr(text, "<controller id");
+        snprintf(changed, sizeof changed,
+                 "%.*s<controller id=\"m\"><morph source=\"#g\"><source id=\"t\"><IDREF_array id=\"ta\" count=\"1\">g"
+                 "</IDREF_array></source></morph></controller>%s",
+                 (int)(at - text), text, at);
+        refuse("m.dae", changed, strlen(changed), "it has a <morph>, which Assimp can't read; allowed are meshes");
+    }
 }
 
 /* Assimp would make a body of each node, for those who want to see an animation alone. */
@@ -316,6 +334,7 @@ int main(void)
         cmocka_unit_test(a_mirrored_node_keeps_its_outer_side),
         cmocka_unit_test(a_skew_is_refused),
         cmocka_unit_test(bones_and_morph_targets_are_reported),
+        cmocka_unit_test(morph_targets_of_collada_are_refused),
         cmocka_unit_test(a_file_without_a_mesh_has_no_bodies),
     };
     return cmocka_run_group_tests_name("collada", tests, make_folder, remove_folder);

@@ -101,7 +101,7 @@ static const struct refused owners[] = {
     {"SITE:POSE 1,0,0,1 2,0,0,0", TYPE "SITE:POSE: z is not a number: '1 2'\""},
     {"SITE:POSE 1,0,0,0,0 M,0,0", SUFFIX "'M'; heading of SITE:POSE takes DEG\""},
     {"SITE:POSE 1,0 DEG,0,0,0,0,0", SUFFIX "'DEG'; x of SITE:POSE takes M\""},
-    {"SITE:POSE 1,1000000001,0,0,0,0,0", RANGE "SITE:POSE: x 1e+09, allowed -1000000000 to 1000000000 m\""},
+    {"SITE:POSE 1,1000000001,0,0,0,0,0", RANGE "SITE:POSE: x 1000000001, allowed -1000000000 to 1000000000 m\""},
     {"SITE:POSE 1,0,0,0,360.1,0,0", RANGE "SITE:POSE: heading 360.1, allowed -360 to 360 deg\""},
     {"SITE:POSE 1,0,0,0,0,-90.5,0", RANGE "SITE:POSE: pitch -90.5, allowed -90 to 90 deg\""},
     {"SITE:POSE 1,0,0,0,0,0,181", RANGE "SITE:POSE: roll 181, allowed -180 to 180 deg\""},

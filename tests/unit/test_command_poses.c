@@ -26,7 +26,7 @@ static void expect_limits(struct command_device *dev, const char *begin, const c
             for (int k = 0; k < 6; k++)
                 assert_true(pose[k] == (k == i ? sign * part[i].most : 0));
             write_pose(line, begin, i, sign * part[i].most, ".5");
-            snprintf(want, sizeof want, "ERR -222,\"Data out of range; %s: %s %.9g, allowed -%.10g to %.10g %s\"",
+            snprintf(want, sizeof want, "ERR -222,\"Data out of range; %s: %s %.12g, allowed -%.10g to %.10g %s\"",
                      header, part[i].name, sign * (part[i].most + 0.5), (double)part[i].most, (double)part[i].most,
                      part[i].unit);
             expect(dev, line, want);

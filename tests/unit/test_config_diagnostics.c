@@ -149,6 +149,9 @@ static void an_unknown_key_gets_the_nearest_one(void **state)
     expect_unknown("tins[]", 1, "head",
                    "shelf.yaml:3: tins[1].head: unknown key, did you mean head at the top of the file? allowed "
                    "weight_kg, name, label");
+    memset(&found, 0, sizeof found);
+    cfg_fail_unknown(&rd, CFG_FROM_SET, "tins[]", 1, "head"); /* a --set has no top of a file */
+    expect_last("--set tins[1].head: unknown key, did you mean head? allowed weight_kg, name, label");
     expect_unknown("", 0, "locked", "shelf.yaml:3: locked: unknown key, did you mean head.locked? allowed head, tins");
     expect_unknown("head", 0, "colour", "shelf.yaml:3: head.colour: unknown key; allowed high_m, locked");
     expect_unknown("", 0, "xyzhead", "shelf.yaml:3: xyzhead: unknown key; allowed head, tins"); /* three letters more */

@@ -190,7 +190,7 @@ static void ride_with(const char *const *sets, int n_sets, int room_ms)
     struct pose pose;
     assert_int_equal(ride(rig, 1, 70000), DEVICE_POSES_KEPT);
     assert_int_equal(atomic_load(&device_counters(rig->device)->bad_poses), 70000 - DEVICE_POSES_KEPT);
-    assert_int_equal(device_pose(rig->device, INT64_C(80000000000), (double[6]){0}, &err), SH_EINPUT);
+    assert_int_equal(device_pose(rig->device, INT64_C(80000000000), (double[6]){0}, &err), SH_ESTATE);
     assert_string_equal(err.text, "a pose has no room: the 65536 that the head keeps are still needed; send it later");
     rig_wait(rig, NATIVE_EV_SCAN_START, 1000);
     for (int i = 0; i < 500; i++) {
@@ -304,14 +304,14 @@ static void a_replay_takes_no_other_poses(void **state)
         assert_int_equal(fclose(f), 0);
         struct rig *rig = rig_open(&(struct device_options){.replay = journal_path}, sets, 2);
         rig_go_to(rig, 10);
-        assert_int_equal(device_pose(rig->device, 5000000, v, &err), rows[i].at_10_ms ? SH_OK : SH_EINPUT);
+        assert_int_equal(device_pose(rig->device, 5000000, v, &err), rows[i].at_10_ms ? SH_OK : SH_ESTATE);
         if (!rows[i].at_10_ms)
             assert_string_equal(err.text, "a pose came while a journal with poses is being replayed");
         device_command(rig->device, 1, "TIME:STEP 1 MS, 1,0,0,0,0,0", 9, &result);
         assert_int_equal(result.error, rows[i].at_10_ms ? 0 : CMD_E_SETTINGS);
         rig_tell(rig, "TIME:STEP 1 MS", 9);
         rig_go_to(rig, 30);
-        assert_int_equal(device_pose(rig->device, 6000000, v, NULL), rows[i].at_30_ms ? SH_OK : SH_EINPUT);
+        assert_int_equal(device_pose(rig->device, 6000000, v, NULL), rows[i].at_30_ms ? SH_OK : SH_ESTATE);
         device_command(rig->device, 1, "TIME:STEP 1 MS, 1,0,0,0,0,0", 29, &result);
         assert_int_equal(result.error, rows[i].at_30_ms ? 0 : CMD_E_SETTINGS);
         rig_close(rig);

@@ -168,10 +168,12 @@ static void the_first_is_reported(void **state)
         {"1.5 1 2 3 4 5\n1.6 1 2", "-104,\"Data type error; a pose is not of the form t_s x y z roll pitch heading", 0},
         {"1.5 0 0 0 0 0 361", "-222,\"Data out of range; heading of a pose is 361, allowed -360 to 360 deg", 0},
         {"1.5 0 0 0 0 -90.5 0", "pitch of a pose is -90.5, allowed -90 to 90 deg", 0},
+        {"1.5 0 0 0 0 90.00000001 0", "pitch of a pose is 90.00000001, allowed -90 to 90 deg", 0}, /* all digits */
         {"1.5 0 0 0 361 0", "a pose is not of the form", 0},
-        {"2e9 0 0 0 0 0 0", "t_s of a pose is 2e+09, allowed -1000000000 to 1000000000 s", 0},
+        {"2e9 0 0 0 0 0 0", "t_s of a pose is 2000000000, allowed -1000000000 to 1000000000 s", 0},
         {"1.5 7 2 3 4 5 6\n1.6 9 9 9 4 5 6", "-222,\"Data out of range; a pose is over 5 m from the station", 0},
         {"1.5 0 0 0 0 0 0\n1.5 1 0 0 0 0 0", "a pose is not after the last pose, of 1.5 s", 1},
+        {"1.000000001 0 0 0 0 0 0\n1.000000001 0 0 0 0 0 0", "after the last pose, of 1.000000001 s", 1},
         {"-0.5 0 0 0 0 0 0", "a pose is before power-up; allowed is 0 s on", 0},
         {"3700 0 0 0 0 0 0", "a pose is over 3600 s ahead", 0}};
     for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
@@ -182,6 +184,25 @@ static void the_first_is_reported(void **state)
         if (strstr(result.reply, rows[i].says) == NULL) fail_msg("%s", result.reply);
         if (i + 1 < sizeof rows / sizeof rows[0]) end(state);
     }
+}
+
+/* A pose that has no room is a conflict with the present state, as in a reply to TIME:STEP. */
+static void a_pose_without_room_is_reported(void **state)
+{
+    (void)state;
+    static const char line[] = "80 0 0 0 0 0 0";
+    struct command_result result = {0};
+    const int64_t until_ns = clock_now_ns() + DEADLINE_NS;
+    for (int i = 1; i <= DEVICE_POSES_KEPT; i++)
+        assert_int_equal(device_pose(rig->device, i * INT64_C(1000000), (double[6]){0}, &err), SH_OK);
+    assert_int_equal(send(fd, line, strlen(line), 0), (int)strlen(line));
+    do {
+        device_command(rig->device, 1, "SYST:ERR?", rig->next, &result);
+        if (clock_now_ns() > until_ns) fail_msg("no error: %s", result.reply);
+        sched_yield();
+    } while (strstr(result.reply, "No error") != NULL);
+    if (strstr(result.reply, "-221,") == NULL || strstr(result.reply, "a pose has no room") == NULL)
+        fail_msg("%s", result.reply);
 }
 
 static void a_port_in_use_is_refused(void **state)
@@ -201,10 +222,8 @@ int main(void)
 {
 #define CASE(f) cmocka_unit_test_setup_teardown(f, begin, end)
     const struct CMUnitTest tests[] = {
-        CASE(these_lines_are_poses),
-        CASE(these_lines_are_none),
-        CASE(the_first_is_reported),
-        CASE(a_port_in_use_is_refused),
+        CASE(these_lines_are_poses),           CASE(these_lines_are_none),     CASE(the_first_is_reported),
+        CASE(a_pose_without_room_is_reported), CASE(a_port_in_use_is_refused),
     };
     return cmocka_run_group_tests_name("poses over UDP", tests, make_folder, remove_folder);
 }

@@ -202,8 +202,12 @@ static void wrong_ones_are_refused(void **state)
     } wrong[] = {
         {"7", 7, "stations[1].scanner: here stands a single value; allowed a section"},
         {"{hed: {lines_hz: 1}}", 7,
-         "stations[1].scanner.hed: unknown key, did you mean head? allowed head, beam, cast"},
-        {"{head: {lines: 1}}", 7, "stations[1].scanner.head.lines: unknown key, did you mean head.lines_hz?"},
+         "stations[1].scanner.hed: unknown key, did you mean stations[1].scanner.head? allowed head, beam, cast"},
+        {"{head: {lines: 1}}", 7,
+         "stations[1].scanner.head.lines: unknown key, did you mean stations[1].scanner.head.lines_hz?"},
+        {"{head: {optics: {}}}", 7, "scanner.head.optics: unknown key, did you mean stations[1].scanner.optics?"},
+        /* A scanner has no section scene: the file has it. */
+        {"{head: {scene: {}}}", 7, "scanner.head.scene: unknown key, did you mean scene at the top of the file?"},
         {"{scene: {cutouts: off}}", 7, "stations[1].scanner.scene: the same for all scanners; allowed sections head"},
         {"{head: {station: 2}}", 7, "stations[1].scanner.head.station: the same for all scanners"},
         {"{head: {lines_hz: 2000}}", 7, "stations[1].scanner.head.lines_hz: 2000 is outside the limits"},

@@ -2,6 +2,7 @@
 /* Carriers of a head: each error and warning with its numbers and limits, and the stops of a head at its stations. */
 #include "tests/unit/site_rig.h"
 
+#include <limits.h>
 #include <math.h>
 
 static struct site *site;
@@ -245,6 +246,38 @@ static void a_live_head_reaches_around_its_station(void **state)
     assert_true(site->stretch[0].reach_m == 35 && site->live_reach_m == 35);
 }
 
+static int stop_at(void *ctx)
+{
+    int *left = ctx;
+    return (*left)-- <= 0;
+}
+
+/* A path of 30 km has more than 10 stretches, and each asks whether to stop. The rest of this site asks fewer times. */
+static void stretches_can_be_stopped(void **state)
+{
+    (void)state;
+    static const char *const GEO = "}\noutput: {layout: geo";
+    int left = INT_MAX;
+    const struct sh_report stopping = {.ctx = &left, .stop = stop_at};
+    write_in("path.csv", LINES "0,0,0,2,0,0\n30,30000,0,2,0,1\n");
+    for (int k = 0; k < 2; k++) {
+        const char *const other =
+            k == 0 ? TWO : ONE ", {name: two, position_m: [3, 4, 2], scanner: {head: {profile: velodyne-vlp16}}}";
+        assert_int_equal(load_at(other, GOES, GEO), SH_OK);
+        assert_true(site->n_stretches > 10 && site->station[0].on_stretch != NULL);
+        assert_int_equal(site->station[1].on_stretch != NULL, k == 0); /* another scanner has its own site */
+    }
+    struct site *again = NULL;
+    assert_int_equal(site_load(cfg, &stopping, &again, &err), SH_OK);
+    const int n_asked = INT_MAX - left;
+    site_free(again);
+    again = NULL;
+    assert_true(n_asked > 10);
+    left = n_asked - 1;
+    assert_int_equal(site_load(cfg, &stopping, &again, &err), SH_ESTOPPED);
+    site_free(again);
+}
+
 static int teardown(void **state)
 {
     site_free(site);
@@ -263,6 +296,7 @@ int main(void)
         cmocka_unit_test(stops_on_a_path),
         cmocka_unit_test(stops_on_the_earth),
         cmocka_unit_test(a_live_head_reaches_around_its_station),
+        cmocka_unit_test(stretches_can_be_stopped),
     };
     return cmocka_run_group_tests_name("platform of a site", tests, site_rig_setup, teardown);
 }

@@ -230,6 +230,30 @@ static void test_next_of_pulses(void **state)
     }
 }
 
+/* With stops, head.station counts these. Its second one is at station two, whose scanner and heading the scans have. So
+ * the copied line needs this heading and the section scanner, and the other station has neither. */
+static void test_next_of_stops(void **state)
+{
+    struct wire *wire = *state;
+    char config[256];
+    wire_write_text(wire, "room.obj", L_ROOM);
+    snprintf(config, sizeof config, "%s",
+             wire_write_text(wire, "stops.yaml",
+                             "head: {profile: hokuyo-urg-04lx, station: 2}\n"
+                             "scene:\n  meshes: [{file: room.obj, up: z, scale: 1}]\n"
+                             "platform: {kind: stops, step_s: 10, end_s: 10}\n"
+                             "stations:\n  - {name: one, position_m: [5, 1, 1.2]}\n"
+                             "  - {name: two, position_m: [4, 1, 1.2], heading_deg: 30,\n"
+                             "     scanner: {head: {profile: velodyne-vlp16}}}\n"));
+    const char *const args[] = {"coverage", config, "--next",       "1",       "--grid", "2", "--height",
+                                "1.2",      "--at", "0,0,6,5,-1,1", "--scans", "1",      NULL};
+    char *text = run(wire, args, 0);
+    if (strstr(text, ", heading_deg: 30}\n    the scans have the scanner and the tripod's cone of station two: add its "
+                     "scanner\n") == NULL)
+        fail_msg("%s", text);
+    free(text);
+}
+
 /* A head near the floor looks up: it sees most of the walls and of the ceiling in the upper leg. Rays that went down
  * would meet the floor near it, and little else. Cells along outlines count as a whole in a scan: half of their 0.25 m
  * along some 20 m of outlines is 12 % of what it sees. */
@@ -338,6 +362,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_mesh, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_next, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_next_of_pulses, wire_setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_next_of_stops, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_next_looks_up, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_refused, wire_setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_interrupt, wire_setup, wire_teardown),

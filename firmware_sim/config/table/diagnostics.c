@@ -197,8 +197,9 @@ int cfg_fail_unknown(struct cfg_reader *rd, int line, const char *parent, uint32
     const struct cfg_key *near = suggest(&rd->table, parent, word);
     if (near == NULL) return cfg_fail(rd, line, name, "unknown key; allowed %s", known);
     rd->bad[cfg_row(rd, near)][strstr(near->path, "[]") != NULL ? item : 0] = 1;
-    const int at_top =
-        section[0] != '\0' && strchr(near->path, '.') == NULL; /* the same word, outside of this section */
-    return cfg_fail(rd, line, name, "unknown key, did you mean %s%s? allowed %s", cfg_name(near->path, item, hint),
-                    at_top ? " at the top of the file" : "", known);
+    if (!rd->in_scanner || !cfg_is_of_scanner(near->path)) before[0] = '\0'; /* the key is the file's */
+    const int is_alone = before[0] == '\0' && strchr(near->path, '.') == NULL, in_file = line != CFG_FROM_SET;
+    return cfg_fail(rd, line, name, "unknown key, did you mean %s%s%s? allowed %s", before,
+                    cfg_name(near->path, item, hint),
+                    section[0] != '\0' && is_alone && in_file ? " at the top of the file" : "", known);
 }

@@ -144,11 +144,6 @@ static int add_jobs(struct batch *b, uint32_t combination, uint32_t n_stations, 
         return sh_fail(err, SH_EINPUT, "--stations %s: there is no station %u; allowed 1 to %u", b->stations_text, last,
                        n_stations);
     if (b->n_jobs + (uint64_t)n > BATCH_MAX_JOBS) return sh_fail(err, SH_EINPUT, "more than %d jobs", BATCH_MAX_JOBS);
-    if (jobs_are_even(b) && b->n_combinations * (uint64_t)n > BATCH_MAX_JOBS)
-        return sh_fail(err, SH_EINPUT,
-                       "%u combinations of --sweep at %u stations are %" PRIu64 " jobs; allowed are %d: "
-                       "give fewer values, or some of the --stations",
-                       b->n_combinations, n, b->n_combinations * (uint64_t)n, BATCH_MAX_JOBS);
     if (!grow(&b->job, &b->job_room, b->n_jobs + n, sizeof *b->job))
         return sh_fail(err, SH_ENOMEM, "no memory for %u jobs", b->n_jobs + n);
     for (uint32_t i = 0; i < n; i++)
@@ -216,6 +211,17 @@ static int plan_combination(struct batch *b, uint32_t combination)
     return status;
 }
 
+/* Refuses too many jobs after the first combination. It is about all combinations, so no values belong to it. */
+static int check_total(const struct batch *b, struct sh_err *err)
+{
+    const uint64_t total = b->n_combinations * (uint64_t)b->n_jobs;
+    if (!jobs_are_even(b) || total <= BATCH_MAX_JOBS) return SH_OK;
+    return sh_fail(err, SH_EINPUT,
+                   "%u combinations of --sweep at %u stations are %" PRIu64 " jobs; allowed are %d: "
+                   "give fewer values, or some of the --stations",
+                   b->n_combinations, b->n_jobs, total, BATCH_MAX_JOBS);
+}
+
 int batch_plan(struct batch *b)
 {
     struct sh_err err = {0};
@@ -226,6 +232,7 @@ int batch_plan(struct batch *b)
     for (uint32_t i = 0; i < b->n_combinations; i++) {
         const int status = plan_combination(b, i);
         if (status != APP_OK) return status;
+        if (i == 0 && check_total(b, &err) != SH_OK) return app_fail(&err);
         if (sh_check_stop(&app_report_stderr, &err) != SH_OK) return app_fail(&err);
         if (!b->quiet) sh_progress(&app_report_seconds, "checking the configurations", (double)i / b->n_combinations);
     }

@@ -24,11 +24,10 @@ struct coverage_run {
     struct app_input in;
     const char *output, *at;
     struct coverage_next_options o;
-    int json, quiet, written;
-    int by; /* number of a word of BY; negative: not given */
+    int json, written, quiet; /* app_parse hides progress */
+    int by;                   /* number of a word of BY; negative: not given */
     enum coverage_colour colour;
     const struct config *cfg;
-    struct sh_report report;
     struct sites sites;
     struct site *site; /* of the scanner of head.station, with all stations' places */
     struct coverage *coverage;
@@ -76,10 +75,10 @@ static int look_from(struct coverage_run *r, uint32_t i, struct sh_err *err)
     double gain_m2;
     if (at == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a scan");
     snprintf(what, sizeof what, "station %u of %u (%s)", i + 1, r->site->n_stations, r->site->station[i].station->name);
-    int rc = site_open_sights(site, i, 1, &r->report, err);
+    int rc = site_open_sights(site, i, 1, &app_report_seconds, err);
     if (rc == SH_OK) {
         coverage_scan_of(site, i, at);
-        rc = coverage_look(r->coverage, &at->scan, what, &r->report, &s->pulses, err);
+        rc = coverage_look(r->coverage, &at->scan, what, &app_report_seconds, &s->pulses, err);
     }
     if (rc == SH_OK) {
         coverage_waiting(r->coverage, &s->seen_m2, &gain_m2);
@@ -122,7 +121,8 @@ static void put_all(struct json *json, const void *ctx)
 static int show(struct coverage_run *r, struct sh_err *err)
 {
     int rc = sum_up(r, err);
-    if (rc == SH_OK && r->output != NULL) rc = coverage_write_mesh(r->coverage, r->output, r->colour, &r->report, err);
+    if (rc == SH_OK && r->output != NULL)
+        rc = coverage_write_mesh(r->coverage, r->output, r->colour, &app_report_seconds, err);
     r->written = rc == SH_OK && r->output != NULL;
     if (rc == SH_OK && !r->json) coverage_print_text(&r->result);
     if (rc == SH_OK && !r->json) fflush(stdout); /* what follows may take long */
@@ -153,7 +153,7 @@ static int open_all(struct coverage_run *r, struct sh_err *err)
     if (rc == SH_OK && r->output != NULL)
         rc = mesh_check_box(r->output, r->site->scene->min_m, r->site->scene->max_m, err);
     if (rc != SH_OK) return rc;
-    r->result.base = r->site->stop != NULL ? 0 : r->cfg->head.settings.station - 1;
+    r->result.base = r->cfg->head.settings.station - 1;
     const struct coverage_spec spec = {.bvh = r->site->bvh,
                                        .silent = r->site->silent,
                                        .cell_m = r->cfg->coverage.cell_m,
@@ -163,11 +163,11 @@ static int open_all(struct coverage_run *r, struct sh_err *err)
     r->result.cell_m = spec.cell_m;
     r->result.station = calloc(r->site->n_stations, sizeof *r->result.station);
     if (r->result.station == NULL) return sh_fail(err, SH_ENOMEM, "no memory for %u stations", r->site->n_stations);
-    rc = coverage_create(&spec, &r->report, &r->coverage, &why);
+    rc = coverage_create(&spec, &app_report_seconds, &r->coverage, &why);
     if (rc == SH_EINPUT) return sh_fail(err, rc, "%s: coverage.cell_m: %.400s", r->cfg->file, why.text);
     if (rc != SH_OK) *err = why;
     if (rc == SH_OK && r->o.stations > 0)
-        rc = coverage_next_open(&r->o, &r->result, &r->report, &r->next, &r->finder, err);
+        rc = coverage_next_open(&r->o, &r->result, &app_report_seconds, &r->next, &r->finder, err);
     return rc;
 }
 
@@ -175,8 +175,6 @@ static int cover(struct config *cfg, void *ctx, struct sh_err *err)
 {
     struct coverage_run *r = ctx;
     r->cfg = cfg;
-    r->report = app_report_seconds;
-    if (r->quiet) r->report.progress = NULL;
     app_catch_signals();
     int rc = open_all(r, err);
     for (uint32_t i = 0; rc == SH_OK && i < r->site->n_stations; i++)

@@ -9,7 +9,7 @@
 
 struct coverage_result {
     const struct site *site; /* of the scanner of head.station */
-    uint32_t base;           /* head.station, counted from 0; 0 where the site has stops */
+    uint32_t base;           /* head.station, counted from 0; with stops it counts these */
     double cell_m;
     struct coverage_sums sums;
     struct coverage_result_station {

@@ -269,8 +269,8 @@ const struct app_command app_init = {
     .options = OPTIONS,
     .notes =
         "MESH is a file .obj .ply .stl .gltf .glb .fbx .dae .ifc .tif. Its unit and axes come from the format where\n"
-        "that defines them (glTF, Collada, IFC, GeoTIFF), or from the file (FBX). Else metres and z up are assumed, "
-        "or\n"
+        "that defines them (glTF, GeoTIFF), or from the file (FBX). Collada and IFC have units and axes of their own,\n"
+        "which are converted to metres and y up as the file is read. Else metres and z up are assumed, or\n"
         "millimetres where the mesh would be larger than 2 km; a warning says so. Metres are assumed, too, for\n"
         "coordinates of a projected system (large compared with the mesh), and for a mesh that would be a thin plate\n"
         "in millimetres.\n"

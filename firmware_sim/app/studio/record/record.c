@@ -324,7 +324,8 @@ static const struct app_option OPTIONS[] = {
     OPTION_NO_HASH(AT(job.no_hash)),
     OPTION_SET,
     {APP_KEY, "crs", "CRS", .key = "output.crs",
-     .help = "write points in this system: local, ecef, utm or geodetic; also sets output.layout=geo"},
+     .help = "write points in this system: local, ecef, utm or geodetic; where the configuration has no output.layout, "
+             "also sets output.layout=geo"},
     {APP_KEY, "threads", "N", .key = "loop.threads", .help = "threads that cast; 0: one per processor"},
     {APP_FLAG, "raw", NULL, .at = AT(raw),
      .help = "write all data from udp:ADDRESS:PORT,... or tcp:HOST:PORT, of any protocol, to a .pcapng; its options: "

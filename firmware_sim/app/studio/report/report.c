@@ -37,9 +37,8 @@ static int report_report(struct config *cfg, void *ctx, struct sh_err *err)
 
 static int report_run(int argc, char **argv)
 {
-    struct report r = {.report = app_report_seconds, .tolerance_m = 0.001, .max_m = 10};
+    struct report r = {.tolerance_m = 0.001, .max_m = 10};
     int status = app_parse(&app_report, argc, argv, &r.in, &r);
-    if (r.quiet) r.report.progress = NULL;
     if (status == APP_GO_ON && r.tolerance_m > r.max_m)
         status = app_usage(&app_report, "--tolerance-m %g is more than --max-m %g", r.tolerance_m, r.max_m);
     if (status == APP_GO_ON && r.html_path != NULL && !app_ends_in(r.html_path, ".html") &&

@@ -50,8 +50,7 @@ struct report_figures {
 struct report {
     struct app_input in;
     const char *cloud_path, *html_path;
-    int json, quiet;
-    struct sh_report report; /* of the work; with --quiet without progress */
+    int json, quiet; /* app_parse hides progress */
     double tolerance_m, max_m, cell_m;
     struct timespec modified; /* of the cloud's file */
     struct config *cfg;

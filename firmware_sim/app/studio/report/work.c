@@ -32,7 +32,7 @@ static int work_load(struct report *r, struct sh_err *err)
     struct stat file;
     const unsigned columns =
         1u << CLOUD_TIME | 1u << CLOUD_ECHO_COUNT | (config_head_moves(&r->cfg->platform) ? 1u << CLOUD_RANGE : 0u);
-    int rc = cloud_read_columns(r->cloud_path, columns, &r->report, &r->cloud, err);
+    int rc = cloud_read_columns(r->cloud_path, columns, &app_report_seconds, &r->cloud, err);
     if (rc == SH_OK && stat(r->cloud_path, &file) == 0) r->modified = file.st_mtim;
     if (rc == SH_OK) rc = sites_load(r->cfg, SITE_WRITTEN_OUT, &app_report_stderr, &r->sites, err);
     r->site = r->sites.first;
@@ -117,18 +117,18 @@ static int work_compare(struct report *r, struct sh_err *err)
     if (rc == SH_OK) rc = check_bodies(r, err);
     if (rc != SH_OK) return rc;
     report_heads(r);
-    rc = cloud_compare(&r->cloud, &r->cloud_site, &r->report, r->distance_m, r->triangle, &why);
+    rc = cloud_compare(&r->cloud, &r->cloud_site, &app_report_seconds, r->distance_m, r->triangle, &why);
     if (rc == SH_OK) {
         cloud_stats(r->distance_m, r->cloud.n, r->tolerance_m, &r->f.stats);
         if (r->f.stats.points > 0) memcpy(r->f.worst, r->cloud.xyz_m[r->f.stats.worst], sizeof r->f.worst);
         r->f.epsg = r->cloud.epsg;
-        rc = cloud_into_scene(&r->cloud, &r->cloud_site, &r->report, &why);
+        rc = cloud_into_scene(&r->cloud, &r->cloud_site, &app_report_seconds, &why);
     }
     if (rc == SH_OK) rc = cloud_cover(&r->cloud, site->scene, site->n_surfaces, r->triangle, &r->f.coverage, &why);
     if (rc == SH_OK && site->moving) without_beams(r);
     if (rc == SH_OK && !site->moving) {
         const struct cloud_compared compared = {&r->cloud, &r->cloud_site, r->distance_m, r->triangle};
-        rc = deviation_along(&compared, r->f.head, &r->report, &r->points, &why);
+        rc = deviation_along(&compared, r->f.head, &app_report_seconds, &r->points, &why);
     }
     return rc == SH_OK ? SH_OK : sh_fail(err, rc, "%s: %.300s", r->cloud_path, why.text);
 }
@@ -194,8 +194,8 @@ static int tables(struct report *r, struct sh_err *err)
                  {f->n_ranges, by_range, f->range},
                  {REPORT_INCIDENCES, by_incidence, f->incidence}};
     for (size_t t = 0; t < sizeof table / sizeof table[0] && rc == SH_OK; t++) {
-        sh_progress(&r->report, "working out tables", (double)t / (sizeof table / sizeof table[0]));
-        rc = sh_check_stop(&r->report, err);
+        sh_progress(&app_report_seconds, "working out tables", (double)t / (sizeof table / sizeof table[0]));
+        rc = sh_check_stop(&app_report_seconds, err);
         if (rc == SH_OK) rc = figures_by(&in, table[t].n, table[t].group, r, table[t].out, err);
     }
     for (uint32_t s = 0; s < n_stations && rc == SH_OK; s++)
@@ -223,8 +223,9 @@ static int densities(struct report *r, struct sh_err *err)
     struct report_figures *f = &r->f;
     const struct cloud_compared compared = {&r->cloud, &r->cloud_site, r->distance_m, r->triangle};
     const struct figures_on_scene in = {&compared, r->site->scene, r->points.range_m};
-    int rc = r->cell_m > 0.0 ? figures_density_of(&in, r->cell_m, &r->report, &f->density, err)
-                             : figures_density_fit(&in, REPORT_CELL_M, &r->report, &f->density, &f->density_all, err);
+    int rc = r->cell_m > 0.0
+                 ? figures_density_of(&in, r->cell_m, &app_report_seconds, &f->density, err)
+                 : figures_density_fit(&in, REPORT_CELL_M, &app_report_seconds, &f->density, &f->density_all, err);
     if (rc != SH_OK) return rc;
     figures_density_within(&f->density, 0, 0.0, (double)INFINITY, &f->density_all);
     for (uint32_t k = 0; k < f->n_ranges; k++)
@@ -258,7 +259,7 @@ int report_work(struct report *r, struct sh_err *err)
     int rc = work_load(r, err);
     if (rc == SH_OK) rc = work_compare(r, err);
     if (rc != SH_OK) return rc;
-    rc = sh_check_stop(&r->report, err);
+    rc = sh_check_stop(&app_report_seconds, err);
     if (rc == SH_OK) rc = tables(r, err);
     if (rc == SH_OK) rc = rank_labels(r, err);
     if (rc == SH_OK) rc = densities(r, err);
