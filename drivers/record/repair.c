@@ -124,12 +124,18 @@ int repair_find_zeros(const struct repair *r, uint64_t from, uint64_t end, uint6
 int repair_leave_zeros(const struct repair *r, struct repair_rows *rows, uint64_t end, size_t least, struct sh_err *err)
 {
     uint64_t zeros_at;
-    const int rc = repair_find_zeros(r, rows->from, end, &zeros_at, err);
+    int rc = repair_find_zeros(r, rows->from, end, &zeros_at, err);
     if (rc != SH_OK) return rc;
     const uint64_t n = (zeros_at - rows->from) / rows->len, row_at = rows->from + n * rows->len;
-    const int may_be_whole = zeros_at - row_at >= least && zeros_at > row_at && row_at + rows->len == end;
-    rows->n = n + (uint64_t)may_be_whole;
-    return SH_OK;
+    rows->n = n + (row_at < zeros_at && row_at + rows->len == end);
+    int is_whole = 0;
+    while (rc == SH_OK && !is_whole && rows->n > 0) { /* so a further repair finds the same rows */
+        const uint64_t at = rows->from + (rows->n - 1) * rows->len;
+        rc = repair_find_zeros(r, at, at + rows->len, &zeros_at, err);
+        is_whole = zeros_at > at && zeros_at - at >= least;
+        rows->n -= !is_whole;
+    }
+    return rc;
 }
 
 struct lines {

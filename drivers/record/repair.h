@@ -78,7 +78,8 @@ int repair_rows(const struct repair *repair, const struct repair_rows *rows, voi
 /* Finds where the zeros begin that a power cut leaves before `end`: there are none where that is `end`. */
 int repair_find_zeros(const struct repair *repair, uint64_t from, uint64_t end, uint64_t *zeros_at, struct sh_err *err);
 /* Leaves out the rows of zeros before `end`, where the file's rows end. The row in which the zeros begin is left out,
- * too, since its rest is lost: where zeros follow it, or where fewer than `least` bytes are before them. */
+ * too, since its rest is lost: where zeros follow it, or where fewer than `least` bytes are before them. So are rows
+ * before it that are no better. */
 int repair_leave_zeros(const struct repair *repair, struct repair_rows *rows, uint64_t end, size_t least,
                        struct sh_err *err);
 /* Returns whether all bytes of a row are 0: a power cut leaves zeros at a file's end. */

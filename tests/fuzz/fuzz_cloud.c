@@ -46,7 +46,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     const char *path = fuzz_file(endings[kind], bytes, in.n);
     if (kind < 2) {
         struct cloud cloud;
-        if (cloud_read_columns(path, how & 63, &fuzz_report, &cloud, &err) == SH_OK)
+        if (cloud_read_columns(path, (how & 15u) | (how >> 4 & 1u) << CLOUD_ECHO_COUNT | (how >> 5 & 1u) << CLOUD_RGB,
+                               &fuzz_report, &cloud, &err) == SH_OK)
             check_cloud(&cloud);
         else
             fuzz_must_be_line(&err);

@@ -54,7 +54,8 @@ static void test_read(void **state)
         assert_true(fabs(cloud.xyz_m[1][2] - 412.126) < 1e-12);
         assert_true(cloud.time_s == NULL && cloud.reflectance_db == NULL && cloud.has_own_counts);
         cloud_free(&cloud);
-        const unsigned columns = CLOUD_TIME | CLOUD_REFLECTANCE | CLOUD_ECHO_COUNT | CLOUD_RANGE;
+        const unsigned columns =
+            1u << CLOUD_TIME | 1u << CLOUD_REFLECTANCE | 1u << CLOUD_ECHO_COUNT | 1u << CLOUD_RANGE;
         assert_int_equal(cloud_read_columns(rig_path("a.las"), columns, NULL, &cloud, &err), 0);
         assert_true(fabs((double)cloud.reflectance_db[0] + 12.34) < 1e-5 && isnan(cloud.reflectance_db[1]));
         assert_true(cloud.echo_count[0] == 2 && cloud.range_m == NULL && cloud.time_s[1] >= cloud.time_s[0]);
@@ -77,7 +78,7 @@ static void test_without_returns(void **state)
     las[at + 14] = 0; /* of the first point */
     write_bytes(las, len);
     free(las);
-    if (cloud_read_columns(rig_path("a.las"), CLOUD_ECHO_COUNT, NULL, &cloud, &err) != 0) fail_msg("%s", err.text);
+    if (cloud_read_columns(rig_path("a.las"), 1u << CLOUD_ECHO_COUNT, NULL, &cloud, &err) != 0) fail_msg("%s", err.text);
     assert_true(cloud.echo[0] == 1 && cloud.echo_count[0] == 1);
     assert_true(cloud.echo[1] == 2 && cloud.echo_count[1] == 2);
     cloud_free(&cloud);

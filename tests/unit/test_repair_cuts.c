@@ -188,6 +188,31 @@ static void test_zeros(void **state)
     }
 }
 
+/* Rows of zeros, then some bytes, then zeros again: pages of a file may reach the disk in any order. What is repaired is
+ * whole, also for a second repair. */
+static void test_zeros_twice(void **state)
+{
+    (void)state;
+    for (int i = 0; i < REPAIR_FORMATS; i++) {
+        if (strstr(repair_formats[i].name, ".las") == NULL) continue;
+        const size_t len = repair_left[i].len;
+        repair_name(repair_formats[i].name);
+        for (size_t some = 1; some < 60; some++) {
+            struct repaired file, again;
+            struct bytes got, second, left = {calloc(1, len + 200), len + 200};
+            memcpy(left.data, repair_left[i].data, len);
+            memset(left.data + len - 150 - some, 0, 150);
+            assert_int_equal(repair(left.data, left.len, &file, &got), 1);
+            assert_in_range(file.n_kept, 1, REPAIR_POINTS);
+            assert_int_equal(repair(got.data, got.len, &again, &second), 1);
+            assert_true(again.was_whole && again.cut_bytes == 0 && again.n_kept == file.n_kept);
+            free(got.data);
+            free(second.data);
+            free(left.data);
+        }
+    }
+}
+
 /* A whole file whose last row ends in a zero byte, and then zeros: the header counts that row. */
 static void test_zeros_after_a_whole_file(void **state)
 {
@@ -333,6 +358,7 @@ int main(void)
         cmocka_unit_test(test_cut_whole),
         cmocka_unit_test(test_damaged),
         cmocka_unit_test(test_zeros),
+        cmocka_unit_test(test_zeros_twice),
         cmocka_unit_test(test_zeros_after_a_whole_file),
         cmocka_unit_test(test_other_format),
         cmocka_unit_test(test_huge_numbers),
