@@ -76,7 +76,7 @@ void *cloud_array(const struct cloud *cloud, enum cloud_column column, size_t *s
  * call that names the column. SH_ENOMEM: the points are unchanged; some arrays may have the new room. */
 int cloud_make_room(struct cloud *cloud, size_t n, unsigned has, struct sh_err *err);
 
-/* Reads positions, stations, echoes and labels, and this set of columns. SH_EINPUT names the file, and the line or byte:
+/* Reads positions, stations, echoes and labels, and this set of columns. SH_EINPUT names the file, and line or byte:
  *   the file is missing, unreadable, truncated, or not PLY or LAS; it lacks x, y or z, or counts more than it can hold;
  *   a coordinate is infinite, or only some of the three are NaN;
  *   a station, echo or label is not a whole number in its range.

@@ -11,8 +11,8 @@
 struct cola_way {
     uint32_t scan;
     int have_pose;
-    /* The last poses of the last three frames that had newer ones. The last pose of a stream frame may be later than the
-     * frame's end, so a time of the next frame may be before it. */
+    /* The last poses of the last three frames that had newer ones. The last pose of a stream frame may be later than
+     * the frame's end, so a time of the next frame may be before it. */
     int64_t t_ns[3];
     double path_m[3], at_m[3];
 };

@@ -94,7 +94,7 @@ static uint32_t find_kind(const struct las_waves *w, const struct las_kind *want
     return best;
 }
 
-/* Returns the bits of a sample in the file. A frame of another sender may have samples beyond the bits that it names. */
+/* Returns the bits of a sample in the file. Another sender's frame may have samples beyond the bits that it names. */
 static uint32_t bits_of(const struct scanhead_wave *wave)
 {
     uint8_t high = 0;

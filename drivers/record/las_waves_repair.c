@@ -89,9 +89,9 @@ static int will_be_renamed(const struct repair *r, char *las)
     return !repair_exists(las);
 }
 
-/* Returns 1 where a .part's packets may have the name X.wdp already: the header is that of a completed file, or a repair
- * was interrupted, which counts the points and renames X.wdp.part only where X.las is free. Else X.wdp is that of an
- * older recording. */
+/* Returns 1 where a .part's packets may have the name X.wdp already: the header is that of a completed file, or a
+ * repair was interrupted, which counts the points and renames X.wdp.part only where X.las is free. Else X.wdp is that
+ * of an older recording. */
 static int may_be_final(const uint8_t *header, int is_renamed)
 {
     const int is_complete = strcmp((const char *)header + LAS_SOFTWARE_AT, LAS_SOFTWARE) == 0;

@@ -32,8 +32,8 @@ void las_packets_take(struct las_packets *packets, const uint8_t *record);
  * changed, 0 where nothing had to be, or a negative error. */
 int las_packets_repair(struct las_packets *packets, struct repair *repair, const struct repair_rows *points,
                        uint8_t *header, struct sh_err *err);
-/* Gives the .wdp its name, if it gets one; without even the head of its record, that .wdp is removed instead. The .las is
- * synced before: its header then says that X.wdp is its own. */
+/* Gives the .wdp its name, if it gets one; without even the head of its record, that .wdp is removed instead. The .las
+ * is synced before: its header then says that X.wdp is its own. */
 int las_packets_settle(struct las_packets *packets, const struct repair *repair, struct sh_err *err);
 void las_packets_free(struct las_packets *packets);
 

@@ -106,8 +106,8 @@ struct usbip_urb {
 
 /* ---- usbip_queue.c */
 
-/* A new URB of an endpoint. NULL: too much is pending, or no memory; the connection is broken. The URB counts as pending
- * until it is queued or freed. */
+/* A new URB of an endpoint. NULL: too much is pending, or no memory; the connection is broken. The URB counts as
+ * pending until it is queued or freed. */
 struct usbip_urb *usbip_urb_new(struct usbip_conn *conn, unsigned endpoint, uint32_t room);
 /* Frees an URB that was not queued. */
 void usbip_urb_free(struct usbip_conn *conn, struct usbip_urb *urb);
