@@ -78,7 +78,8 @@ static void test_without_returns(void **state)
     las[at + 14] = 0; /* of the first point */
     write_bytes(las, len);
     free(las);
-    if (cloud_read_columns(rig_path("a.las"), 1u << CLOUD_ECHO_COUNT, NULL, &cloud, &err) != 0) fail_msg("%s", err.text);
+    if (cloud_read_columns(rig_path("a.las"), 1u << CLOUD_ECHO_COUNT, NULL, &cloud, &err) != 0)
+        fail_msg("%s", err.text);
     assert_true(cloud.echo[0] == 1 && cloud.echo_count[0] == 1);
     assert_true(cloud.echo[1] == 2 && cloud.echo_count[1] == 2);
     cloud_free(&cloud);
