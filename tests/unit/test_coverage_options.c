@@ -13,7 +13,7 @@ extern const struct app_command app_coverage;
 
 static struct coverage_next_options got;
 static char candidates[64]; /* a copy: the option's text ends with the command */
-static int n_opened, shows_progress;
+static int n_opened;
 
 int coverage_next_open(const struct coverage_next_options *options, const struct coverage_result *result,
                        const struct sh_report *report, struct coverage_next *next, struct coverage_finder *finder,
@@ -22,7 +22,6 @@ int coverage_next_open(const struct coverage_next_options *options, const struct
     assert_true(result->site->n_stations == 2 && result->base == 1 && result->cell_m == 0.5);
     assert_true(report->stop != NULL && next != NULL && finder != NULL);
     got = *options;
-    shows_progress = report->progress != NULL;
     snprintf(candidates, sizeof candidates, "%s", options->candidates != NULL ? options->candidates : "");
     n_opened++;
     return sh_fail(err, SH_EINPUT, "no places");
@@ -48,7 +47,6 @@ static void ask(const char *words)
     does(&app_coverage, text, 2);
     assert_string_equal(on_err, "scanhead: no places\n");
     assert_int_equal(n_opened, 1);
-    assert_int_equal(shows_progress, 0);
 }
 
 static void defaults(void **state)
@@ -75,8 +73,6 @@ static void all_options(void **state)
     assert_true(got.scans == 1 && got.step_deg == 30);
     does(&app_coverage, "c.yaml --quiet", 0); /* nothing is looked for */
     assert_int_equal(n_opened, 1);
-    does(&app_coverage, "c.yaml --next 1 --grid 0.25", 2);
-    assert_int_equal(shows_progress, 1);
 }
 
 int main(void)
