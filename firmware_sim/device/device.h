@@ -146,8 +146,8 @@ void device_lost(struct device *device, const struct device_work *work);
 void device_done(struct device_work *work);
 /* Holds the site of a scan, by the scan's number, for callers that claim no ticks. NULL: it is neither the scan at hand
  * nor the last one. If stations have moved since the last scan, its site has their present places. The site is valid
- * until device_give_back, which must come before device_free, and soon after the scan's end. Takes the device's lock for a
- * moment. Any thread. */
+ * until device_give_back, which must come before device_free, and soon after the scan's end. Takes the device's lock
+ * for a moment. Any thread. */
 const struct site *device_hold_scan(struct device *device, uint32_t number, struct device_version **version);
 /* True while nothing happens without a command. The pace `fast` waits then. */
 int device_is_idle(struct device *device);

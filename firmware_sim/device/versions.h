@@ -26,10 +26,10 @@ struct device_version {
 /* Stations that are moved, one at a time (moves.c). plan, made, ahead and err belong to the thread that plans, without
  * the lock. */
 struct device_moves {
-    const struct site *first;       /* the site of power-up */
-    struct device_version *current; /* of device->site */
-    struct device_version *variants;
-    struct device_version *old; /* earlier ones that are not freed yet. The thread that plans frees unused ones */
+    const struct site *first;        /* the site of power-up */
+    struct device_version *current;  /* of device->site */
+    struct device_version *variants; /* with the device's lock held */
+    struct device_version *old;      /* earlier ones that are not freed yet. The thread that plans frees unused ones */
     struct command_place *place, *first_place;
     _Atomic int stops; /* the run ends, and planning with it */
     struct device_move {

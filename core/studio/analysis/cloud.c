@@ -36,6 +36,7 @@ void *cloud_array(const struct cloud *cloud, enum cloud_column column, size_t *s
 
 int cloud_make_room(struct cloud *cloud, size_t n, unsigned has, struct sh_err *err)
 {
+    if (n == 0) return SH_OK; /* a file without points has no columns */
     bool ok = resize(&cloud->xyz_m, n, sizeof *cloud->xyz_m);
     for (int c = 0; c < CLOUD_COLUMNS && ok; c++)
         if ((has >> c & 1u) != 0) ok = resize((char *)cloud + arrays[c].at, n, arrays[c].size);

@@ -258,7 +258,7 @@ int cloud_read_pcd(const char *path, const struct sh_report *report, struct clou
     int rc = text_open(&g->t, path, NULL, NULL, err);
     if (rc == SH_OK) rc = pcd_read_header(g, err);
     if (rc == SH_OK) rc = take_points(g, err);
-    out->n = (size_t)g->n;
+    if (rc == SH_OK) out->n = (size_t)g->n;
     if (rc == SH_OK && pcd_is_single(g)) cloud_note_single(out, path, report);
     if (rc == SH_OK && g->has_more)
         sh_warn(report, "%s: it goes on after the %llu points that its header counts; the rest is left out", path,

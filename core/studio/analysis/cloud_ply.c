@@ -116,8 +116,9 @@ static int begin_element(void *reading, struct sh_err *err)
     for (int c = 0; c < CLOUD_COLUMNS; c++)
         if (c == CLOUD_RGB ? has_colours(&g->r.h, e) : ply_find(&g->r.h, e, use_of[c]) != NULL) has |= 1u << c;
     has &= g->columns | 1u << CLOUD_STATION | 1u << CLOUD_LABEL | 1u << CLOUD_ECHO;
-    g->cloud->n = (size_t)e->count; /* it is checked against the file's size */
-    return cloud_make_room(g->cloud, g->cloud->n, has, err);
+    const int rc = cloud_make_room(g->cloud, (size_t)e->count, has, err); /* checked against the file's size */
+    if (rc == SH_OK) g->cloud->n = (size_t)e->count;
+    return rc;
 }
 
 static int progress(void *reading, double fraction, struct sh_err *err)
