@@ -127,7 +127,7 @@ static void colours_and_transparency(void **state)
     }
 }
 
-/* What Assimp itself warns of is passed on. The triangles have the material "q", which the node binds to nothing. */
+/* Warnings of Assimp itself are passed on. The triangles have the material "q", which the node binds to nothing. */
 static void warnings_of_the_reader_are_passed_on(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What may lie beside a LAS file with waveforms as it is repaired: any file of the name X.wdp, the .wdp of an older
+/* A LAS file with waveforms is repaired, and this may lie beside it: any file of the name X.wdp, the .wdp of an older
  * recording, or packets whose end a power cut has made zeros. */
 #include "tests/unit/las_packets_rig.h"
 

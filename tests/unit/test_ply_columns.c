@@ -71,7 +71,7 @@ static void test_float_far_away(void **state)
     assert_int_equal(record(out_path, (struct recorder_options){.columns = columns}, 1, &err), SH_EINPUT);
     assert_non_null(strstr(err.text, "coordinates of 21475 m as float would be wrong by up to 0.0013 m"));
 
-    /* One far point is enough, be it the first of its frame or the last. */
+    /* One far point is enough, the first of its frame or the last. */
     for (int far = 0; far < N; far += N - 1) {
         begin_stream();
         put_descriptor(1, 1, 0);

@@ -324,7 +324,7 @@ static void what_is_there_stays(void **state)
     free(yaml);
     assert_int_equal(RUN(wire, "init", "room.obj", "--force"), 0);
     assert_int_equal(RUN(wire, "check", "room.yaml"), 0);
-    /* What is written stays where nothing can be printed, and the command says so. */
+    /* The configuration stays where nothing can be printed, and the command says so. */
     char room[512], other[512];
     snprintf(room, sizeof room, "%s", wire_path(wire, "room.obj"));
     snprintf(other, sizeof other, "%s", wire_path(wire, "other.yaml"));
