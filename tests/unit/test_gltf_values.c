@@ -152,6 +152,8 @@ static void filters_of_meshopt(void **state)
     (void)state;
     static const unsigned index[5] = {7, 7, 3, 900, 0};
     static const float exact[4] = {1.5f, -2.25f, 1024.0f, 0.0f};
+    /* EXT_meshopt_compression: m 2^e, with e in the upper 8 bits and m in the lower 24, both signed. */
+    static const uint32_t exponential[4] = {0xff000003, 0xfefffff7, 0x0a000001, 0};
     static const float unit[2][4] = {{0.6f, 0.0f, -0.8f, 0.0f}, {-0.36f, 0.48f, 0.8f, 0.0f}};
     static const float turn[2][4] = {{0.5f, -0.5f, 0.5f, 0.5f}, {0.0f, 0.6f, 0.0f, 0.8f}};
     uint8_t packed[512], filtered[64], out[64];
@@ -159,8 +161,7 @@ static void filters_of_meshopt(void **state)
     size_t n = meshopt_encodeIndexSequence(packed, sizeof packed, index, 5);
     assert_int_equal(unpack(&(struct gltf_packed){{packed, n}, 4, 5, "INDICES", NULL}, out, &err), SH_OK);
     assert_memory_equal(out, index, sizeof index);
-    meshopt_encodeFilterExp(filtered, 1, sizeof exact, 24, exact);
-    n = meshopt_encodeVertexBuffer(packed, sizeof packed, filtered, 1, sizeof exact);
+    n = meshopt_encodeVertexBuffer(packed, sizeof packed, exponential, 1, sizeof exact);
     assert_int_equal(unpack(&(struct gltf_packed){{packed, n}, 16, 1, "ATTRIBUTES", "EXPONENTIAL"}, out, &err), SH_OK);
     assert_memory_equal(out, exact, sizeof exact);
     meshopt_encodeFilterOct(filtered, 2, 4, 8, unit[0]);
