@@ -263,7 +263,7 @@ struct native_telemetry {
     uint32_t scan;
     uint64_t pulses, echoes, lines, lost_pulses, late_blocks;
     uint32_t late_max_us, errors_queued;
-    uint64_t reader_lost_frames;               /* of the reader who gets this frame; 0 in the common stream */
+    uint64_t reader_lost_frames;               /* always 0: events READER_LOST have it */
     int64_t utc_ns;                            /* UTC of this frame's device time, ns since 1970, 0 when unknown */
     uint64_t scan_fired, scan_cast, scan_lost; /* pulses of that scan up to here */
     uint64_t lost_lines;                       /* missing in the head's files; sent where it is not 0, and with PTP */
