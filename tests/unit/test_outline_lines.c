@@ -94,9 +94,9 @@ static void parts_are_hidden_by_their_own_range(void **state)
     (void)state;
     static const double near[3] = {1.0, 9.0, 0.0}, far[3] = {1.0, 11.0, 0.0};
     static struct outline_prober prober;
-    struct beam beam;
-    struct sides sides = {10.0, 10.0, 1, 2, -2.0, 2.0, 0, 0.0, 0.0};
-    const struct beam_probe how = {see, &sides};
+    static struct beam beam;
+    static struct sides sides = {10.0, 10.0, 1, 2, -2.0, 2.0, 0, 0.0, 0.0};
+    static const struct beam_probe how = {see, &sides};
     beam_init(&beam, 0.0, 2.0 * 0.2 / 10.0 * (1.0 + 1e-9), 4e-9);
     prober.probe = &how;
     prober.beam = &beam;
