@@ -48,9 +48,8 @@ struct site_station {
     struct georef *georef;
     struct placement at;
     struct site_tripod tripod;
-    struct cast_beam *beam;         /* NULL: one ray per pulse */
-    struct beam_outlines *outlines; /* of an adaptive beam */
-    double scale[3];                /* of geo points on the wire, units of the CRS per count */
+    struct cast_beam *beam; /* with outlines of its own where it is adaptive; NULL: one ray per pulse */
+    double scale[3];        /* of geo points on the wire, units of the CRS per count */
     struct site_on_stretch
         *on_stretch;      /* [n_stretches] of a trajectory, in the geo layout; else, or with another scanner, NULL */
     struct plan_row plan; /* how the georef's method was chosen; of the worst stretch */
