@@ -44,7 +44,6 @@ struct site_tripod {
 struct site_station {
     const struct config_station *station; /* of the configuration, or of stops */
     struct sight *_Atomic sight;          /* its visibility map; NULL: rays go to the BVH (site_open_sights) */
-    _Atomic uint32_t *sight_users;        /* sites that share the map */
     struct georef *georef;
     struct placement at;
     struct site_tripod tripod;
