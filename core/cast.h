@@ -82,7 +82,7 @@ struct cast_beam {
                           * tripod without legs, and beams that begin at station_m (no instrument_has_offset). */
     uint32_t max_echoes; /* of a pulse; up to LINE_MAX_ECHOES */
     struct beam_pattern pattern, fine; /* sub-rays of a whole footprint; places for beam_cut */
-    const struct beam_outlines *outlines;
+    struct beam_outlines *outlines;    /* NULL: it has none; its maker frees them */
 };
 
 /* Colours of points. Colours by range go by the range that is sent. Height is that of the true beam, also where

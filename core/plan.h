@@ -29,6 +29,8 @@ struct plan_option {
     double echo_share; /* bound; NaN: not known */
     double cost_ns;    /* per pulse, added to the cost of a single ray; < 0 where it saves; NaN: depends on the scene */
     char why_not[96];  /* why it is not possible; empty: it is */
+    enum beam_mode mode; /* of a beam: plan_beam_option sets both */
+    uint32_t rings;
 };
 
 enum { PLAN_MAX_OPTIONS = 12 };
@@ -100,12 +102,12 @@ int plan_sample_create(const struct plan_places *places, const struct sh_report 
                        struct sh_err *err);
 void plan_sample_free(struct plan_sample *sample);
 
-/* Finds the error of a beam against BEAM_MAX_RINGS rings (1,027 sub-rays): sets error_m and echo_share of option,
+/* Finds the error of the option's beam against BEAM_MAX_RINGS rings (1,027 sub-rays): sets error_m and echo_share,
  * and for BEAM_ADAPTIVE, whose places have outlines, cost_ns. BEAM_SINGLE: one ray. Both figures have margins: error_m
  * is the root of the mean square plus three standard errors of that mean. For footprints that do not lie on one smooth
  * surface, echo_share has the 95 % limit of Poisson's distribution. For the other footprints it has the share that was
  * found, without a margin. The first call casts the reference. */
-void plan_sample_beam(struct plan_sample *sample, enum beam_mode mode, uint32_t rings, struct plan_option *option);
+void plan_sample_beam(struct plan_sample *sample, struct plan_option *option);
 
 /* Finds the error of following pulses through only `depth` surfaces of glass or mirrors, against CAST_MAX_DEPTH. A
  * pulse whose way goes on after CAST_MAX_DEPTH surfaces counts as wrong: the rest of its way is not known. Sets
@@ -157,7 +159,7 @@ struct plan_methods {
     int sight;           /* first hits are looked up in the station's map */
 };
 
-/* Sets a beam's name, and its cost where that does not depend on the scene. The beam's error is not known yet. */
+/* Sets a beam, its name, and its cost where that does not depend on the scene. The beam's error is not known yet. */
 void plan_beam_option(enum beam_mode mode, uint32_t rings, struct plan_option *option);
 
 /* Fills the row of the mesh: the error of its vertices, see struct scene. */

@@ -56,6 +56,9 @@ double sight_examined(const struct sight_spec *spec);
 /* Made by `threads` threads (0: all). SH_ESTOPPED where report asks to stop, SH_ENOMEM. */
 int sight_create(const struct sight_spec *spec, unsigned threads, const struct sh_report *report, struct sight **out,
                  struct sh_err *err);
+/* Counts one more owner, and returns the sight. Any thread. */
+struct sight *sight_share(struct sight *sight);
+/* Frees the sight with its last owner. Any thread. */
 void sight_free(struct sight *sight);
 const struct sight_info *sight_get_info(const struct sight *sight);
 

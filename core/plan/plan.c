@@ -45,7 +45,8 @@ void plan_cast(uint32_t packet, struct plan_row *row)
 void plan_beam_option(enum beam_mode mode, uint32_t rings, struct plan_option *option)
 {
     uint32_t n = 1 + 3 * rings * (rings + 1);
-    *option = (struct plan_option){.method = "single", .error_m = (double)NAN, .echo_share = (double)NAN};
+    *option = (struct plan_option){
+        .method = "single", .error_m = (double)NAN, .echo_share = (double)NAN, .mode = mode, .rings = rings};
     if (mode == BEAM_RINGS) {
         snprintf(option->method, sizeof option->method, "rings %u (%u rays)", rings, n);
         option->cost_ns = n * PLAN_COST_SUB_RAY;

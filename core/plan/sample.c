@@ -246,20 +246,20 @@ static void conclude(const struct tally *t, double pulses, struct plan_option *o
     option->error_m = t->echoes > 0.0 ? sqrt((t->sum2 + 3.0 * sqrt(t->sum4)) / t->echoes) : 0.0;
 }
 
-void plan_sample_beam(struct plan_sample *s, enum beam_mode mode, uint32_t rings, struct plan_option *option)
+void plan_sample_beam(struct plan_sample *s, struct plan_option *option)
 {
     struct cast_counters before, after;
     struct tally tally = {0};
     struct echoes got;
     double outlined = 0.0, sub_rays = 0.0;
     prepare_beam(s);
-    set_rings(s, rings);
+    set_rings(s, option->rings);
     double plain_weight = s->plain_looks != 0 ? (double)s->plain / (double)s->plain_looks : 0.0;
     caster_get_counters(s->caster, &before);
     for (uint32_t i = 0; i < s->n_looks && !sh_stopped(s->report); i++) {
         const struct look *look = &s->look[i];
         double weight = look->mixed ? 1.0 : plain_weight;
-        cast_beam(s, look, mode, &got);
+        cast_beam(s, look, option->mode, &got);
         sample_compare(&tally, &got, &look->reference, weight, look->mixed);
         caster_get_counters(s->caster, &after);
         outlined += weight * (double)(after.outlined - before.outlined);
@@ -268,7 +268,7 @@ void plan_sample_beam(struct plan_sample *s, enum beam_mode mode, uint32_t rings
     }
     double pulses = (double)s->drawn;
     conclude(&tally, pulses, option);
-    if (mode != BEAM_ADAPTIVE || !(pulses > 0.0)) return;
+    if (option->mode != BEAM_ADAPTIVE || !(pulses > 0.0)) return;
     option->cost_ns = PLAN_COST_OUTLINES + outlined / pulses * PLAN_COST_CUT + sub_rays / pulses * PLAN_COST_SUB_RAY;
 }
 

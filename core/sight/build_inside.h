@@ -14,8 +14,6 @@
 #ifndef CORE_SIGHT_BUILD_INSIDE_H
 #define CORE_SIGHT_BUILD_INSIDE_H
 
-#include <stdatomic.h>
-
 #include "core/sight/sight_inside.h"
 
 enum {

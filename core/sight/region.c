@@ -9,10 +9,9 @@
 
 enum { NO_CANDIDATE = 0xffffffff };
 
-/* A square of cells on the face, `size` cells wide, and its middle. */
+/* A square of cells on the face, `size` cells wide. */
 struct square {
     uint32_t u, v, size;
-    double mid_u, mid_v, half;
 };
 
 /* Candidates that may be seen in a square. */
@@ -249,18 +248,16 @@ static int all_cover(const struct seen *seen)
 
 static void divide(struct division *d, const struct square *q, const struct seen *seen);
 
-static void make_quarters(const struct square *q, const struct seen *seen, struct quarters *four)
+/* Middles and halves are exact: cells are a power of two. */
+static void make_quarters(uint32_t cells, const struct square *q, const struct seen *seen, struct quarters *four)
 {
-    const double half = 0.5 * q->half;
+    const uint32_t size = q->size / 2;
+    const double cell = 2.0 / cells, half = 0.5 * size * cell;
+    four->half = half + SIGHT_PAD;
     for (uint32_t k = 0; k < 4; k++) {
-        four->square[k] = (struct square){.u = q->u + (k & 1) * (q->size / 2),
-                                          .v = q->v + (k >> 1) * (q->size / 2),
-                                          .size = q->size / 2,
-                                          .mid_u = q->mid_u + (k & 1 ? half : -half),
-                                          .mid_v = q->mid_v + (k & 2 ? half : -half),
-                                          .half = half};
-        four->u[k] = four->square[k].mid_u;
-        four->v[k] = four->square[k].mid_v;
+        four->square[k] = (struct square){q->u + (k & 1) * size, q->v + (k >> 1) * size, size};
+        four->u[k] = four->square[k].u * cell + half - 1.0;
+        four->v[k] = four->square[k].v * cell + half - 1.0;
         four->seen[k].list = seen->above + k * (size_t)seen->n;
         four->seen[k].above = seen->above + 4 * (size_t)seen->n;
     }
@@ -269,8 +266,7 @@ static void make_quarters(const struct square *q, const struct seen *seen, struc
 static void divide_quarters(struct division *d, const struct square *q, const struct seen *seen)
 {
     struct quarters four;
-    four.half = 0.5 * q->half + SIGHT_PAD;
-    make_quarters(q, seen, &four);
+    make_quarters(d->b->sight->cells, q, seen, &four);
     region_look(d->w, seen, &four);
     for (uint32_t k = 0; k < 4; k++) {
         struct seen *mine = &four.seen[k];
@@ -381,21 +377,11 @@ static int gather(struct build_shared *b, struct build_work *w, uint32_t region,
     return SH_OK;
 }
 
-static struct square square_of(const struct build_shared *b, uint32_t region)
-{
-    const uint32_t at = region % (b->regions * b->regions), size = b->region_cells;
-    const double cell = 2.0 / b->sight->cells;
-    struct square q = {
-        .u = at % b->regions * size, .v = at / b->regions * size, .size = size, .half = 0.5 * size * cell};
-    q.mid_u = (q.u + 0.5 * size) * cell - 1.0;
-    q.mid_v = (q.v + 0.5 * size) * cell - 1.0;
-    return q;
-}
-
 int build_region(struct build_shared *b, struct build_work *w, uint32_t region)
 {
-    struct division d = {.b = b, .w = w, .face = region / (b->regions * b->regions)};
-    const struct square all = square_of(b, region);
+    const uint32_t each = b->regions * b->regions, at = region % each, size = b->region_cells;
+    struct division d = {.b = b, .w = w, .face = region / each};
+    const struct square all = {at % b->regions * size, at / b->regions * size, size};
     int fits;
     if (!b->seen[region]) return SH_OK;
     int rc = gather(b, w, region, d.face, &fits);

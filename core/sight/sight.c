@@ -199,6 +199,7 @@ int sight_create(const struct sight_spec *spec, unsigned threads, const struct s
     struct sight *s = *out = calloc(1, sizeof *s);
     if (s == NULL) return sh_fail(err, SH_ENOMEM, "sight: no memory");
     const int64_t start_ns = monotonic_ns();
+    atomic_init(&s->owners, 1);
     s->bvh = spec->bvh;
     memcpy(s->station_m, spec->station_m, sizeof s->station_m);
     int rc = make(s, spec, threads, report, err);
@@ -211,9 +212,15 @@ int sight_create(const struct sight_spec *spec, unsigned threads, const struct s
     return SH_OK;
 }
 
+struct sight *sight_share(struct sight *sight)
+{
+    atomic_fetch_add(&sight->owners, 1);
+    return sight;
+}
+
 void sight_free(struct sight *sight)
 {
-    if (sight == NULL) return;
+    if (sight == NULL || atomic_fetch_sub(&sight->owners, 1) != 1) return;
     free_arrays(sight);
     free(sight);
 }

@@ -39,6 +39,8 @@
 #ifndef CORE_SIGHT_SIGHT_INSIDE_H
 #define CORE_SIGHT_SIGHT_INSIDE_H
 
+#include <stdatomic.h>
+
 #include "core/sight.h"
 
 enum {
@@ -104,6 +106,7 @@ struct sight_record {
 #define SIGHT_NEAR 1e6
 
 struct sight {
+    _Atomic uint32_t owners;
     const struct bvh *bvh;
     double station_m[3];
     uint32_t cells; /* power of two */

@@ -59,41 +59,36 @@ static int make_beam(const struct site *site, struct site_station *s, int adapti
     beam->max_echoes = p->max_echoes;
     beam_init(&beam->beam, p->beam_exit_m, p->beam_divergence_rad, 1e-9 * p->pulse_width_ns);
     beam_rings(BEAM_FINE_RINGS, &beam->fine);
-    if (!adaptive || s->outlines != NULL) return SH_OK;
+    if (!adaptive || beam->outlines != NULL) return SH_OK;
     if (site->scene->n_triangles > MANY_TRIANGLES) sh_progress(report, "looking for outlines", -1.0);
     const struct beam_outlines_spec spec = {site->scene,    s->at.position_m,  &beam->beam,
                                             p->range_max_m, site->detect.kind, report};
-    int rc = cast_outlines(&spec, site->bvh, &s->outlines, err);
-    beam->outlines = s->outlines;
-    return rc;
+    return cast_outlines(&spec, site->bvh, &beam->outlines, err);
 }
 
-static void drop_beam(struct site_station *s, int with_beam)
+void site_free_beam(struct site_station *s)
 {
-    beam_outlines_free(s->outlines);
-    s->outlines = NULL;
-    if (s->beam != NULL) s->beam->outlines = NULL;
-    if (!with_beam) return;
+    if (s->beam == NULL) return;
+    beam_outlines_free(s->beam->outlines);
     free(s->beam);
     s->beam = NULL;
 }
 
-/* Makes the planned beam of each station. */
+/* Makes the planned beam of each station. Trials leave beams, which may have outlines that no run needs. */
 static int apply_beam(struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const struct plan_methods *methods = &site->plan.methods;
-    int rc = SH_OK, adaptive = methods->beam == BEAM_ADAPTIVE;
-    for (uint32_t i = 0; i < site->n_stations && rc == SH_OK; i++) {
+    const int adaptive = methods->beam == BEAM_ADAPTIVE;
+    for (uint32_t i = 0; i < site->n_stations; i++) {
         struct site_station *s = &site->station[i];
-        if (!config_serves(site->cfg, i)) continue;
-        if (!adaptive) drop_beam(s, methods->beam == BEAM_SINGLE);
-        if (methods->beam == BEAM_SINGLE) continue;
-        rc = make_beam(site, s, adaptive, report, err);
+        if (!adaptive) site_free_beam(s);
+        if (methods->beam == BEAM_SINGLE || !config_serves(site->cfg, i)) continue;
+        int rc = make_beam(site, s, adaptive, report, err);
         if (rc != SH_OK) return rc;
         s->beam->mode = methods->beam;
         beam_rings(methods->rings, &s->beam->pattern);
     }
-    return rc;
+    return SH_OK;
 }
 
 /* ---- the choice of a beam */
@@ -110,68 +105,51 @@ static int make_beams(struct trial *trial, int adaptive, const struct sh_report 
     return rc;
 }
 
-struct beam_choice {
-    enum beam_mode mode;
-    uint32_t rings;
-};
-
 /* Lists all beams, those of known cost in the order of their cost. */
-static void list_beams(const struct site *site, struct beam_choice *choice, struct plan_option *option)
+static void list_beams(const struct site *site, struct plan_option option[FOOTPRINT_OPTIONS])
 {
     static const uint32_t rings[FOOTPRINT_OPTIONS - 2] = {1, 2, 3, 4, 6, 8, 12};
+    plan_beam_option(BEAM_SINGLE, site->cfg->beam.rings, &option[0]);
+    plan_beam_option(BEAM_ADAPTIVE, site->cfg->beam.rings, &option[1]);
+    for (uint32_t i = 2; i < FOOTPRINT_OPTIONS; i++)
+        plan_beam_option(BEAM_RINGS, rings[i - 2], &option[i]);
     for (uint32_t i = 0; i < FOOTPRINT_OPTIONS; i++) {
-        choice[i] = (struct beam_choice){i == 0   ? BEAM_SINGLE
-                                         : i == 1 ? BEAM_ADAPTIVE
-                                                  : BEAM_RINGS,
-                                         i < 2 ? site->cfg->beam.rings : rings[i - 2]};
-        plan_beam_option(choice[i].mode, choice[i].rings, &option[i]);
-        const char *why = why_not(site, choice[i].mode);
+        const char *why = why_not(site, option[i].mode);
         if (why != NULL) snprintf(option[i].why_not, sizeof option[i].why_not, "%s", why);
     }
 }
 
-/* The beams to choose from: all, or the one that the configuration forces. */
-struct beam_choices {
-    struct beam_choice beam[FOOTPRINT_OPTIONS];
-    struct plan_option option[FOOTPRINT_OPTIONS];
-    uint32_t n;
-};
-
 /* Measures the errors of the beams that are possible. Once one keeps the tolerance, those that cost more are left out.
- * Finding outlines takes time: the adaptive beam is measured only where single rays don't keep the tolerance. Sets
- * *holds to 1 if a beam keeps it. */
-static int measure_beams(struct trial *trial, struct beam_choices *c, const struct sh_report *report,
-                         struct sh_err *err, int *holds)
+ * Finding outlines takes time: the adaptive beam is measured only where single rays don't keep the tolerance. Warns
+ * where no beam of several keeps it. */
+static int measure_beams(struct trial *trial, struct plan_option *option, uint32_t n, const struct sh_report *report,
+                         struct sh_err *err)
 {
-    const struct plan_tolerance *tolerance = &trial->site->cfg->plan;
+    const struct config *cfg = trial->site->cfg;
     double cost_ns = (double)INFINITY;
-    int rc = SH_OK;
-    for (uint32_t i = 0; i < c->n && rc == SH_OK; i++) {
-        struct plan_option *option = &c->option[i];
-        if (option->why_not[0] != '\0' || option->cost_ns > cost_ns) continue;
-        if (c->beam[i].mode == BEAM_ADAPTIVE) {
-            if (*holds) continue;
-            rc = make_beams(trial, 1, report, err);
-            if (rc != SH_OK) return rc;
-        }
-        plan_sample_beam(trial->sample, c->beam[i].mode, c->beam[i].rings, option);
+    int rc = SH_OK, holds = 0;
+    for (struct plan_option *it = option; it < option + n && rc == SH_OK; it++) {
+        if (it->why_not[0] != '\0' || it->cost_ns > cost_ns || (it->mode == BEAM_ADAPTIVE && holds)) continue;
+        if (it->mode == BEAM_ADAPTIVE) rc = make_beams(trial, 1, report, err);
+        if (rc != SH_OK) return rc;
+        plan_sample_beam(trial->sample, it);
         rc = sh_check_stop(report, err);
-        if (!plan_holds(option, tolerance)) continue;
-        *holds = 1;
-        cost_ns = option->cost_ns;
+        if (!plan_holds(it, &cfg->plan)) continue;
+        holds = 1;
+        cost_ns = it->cost_ns;
     }
+    if (rc == SH_OK && !holds && cfg->beam.mode == BEAM_AUTO)
+        sh_warn(report, "%s: beam.mode: auto: no mode keeps plan.tolerance_m and plan.echo_tolerance here", cfg->file);
     return rc;
 }
 
-static int try_beams(struct site *site, struct beam_choices *c, const struct sh_report *report, struct sh_err *err)
+static int try_beams(struct site *site, struct plan_option *option, uint32_t n, const struct sh_report *report,
+                     struct sh_err *err)
 {
     struct trial trial = {0};
-    int holds = 0, rc = open_trial(&trial, site, report, err);
+    int rc = open_trial(&trial, site, report, err);
     if (rc == SH_OK) rc = make_beams(&trial, 0, report, err);
-    if (rc == SH_OK) rc = measure_beams(&trial, c, report, err, &holds);
-    if (rc == SH_OK && !holds && site->cfg->beam.mode == BEAM_AUTO)
-        sh_warn(report, "%s: beam.mode: auto: no mode keeps plan.tolerance_m and plan.echo_tolerance here",
-                site->cfg->file);
+    if (rc == SH_OK) rc = measure_beams(&trial, option, n, report, err);
     plan_sample_free(trial.sample);
     return rc;
 }
@@ -191,25 +169,23 @@ static int choose_beam(struct site *site, const struct sh_report *report, struct
 {
     const struct config *cfg = site->cfg;
     const int forced = cfg->beam.mode != BEAM_AUTO;
-    struct beam_choices c = {.n = FOOTPRINT_OPTIONS};
+    const uint32_t n = forced ? 1 : FOOTPRINT_OPTIONS;
+    struct plan_option option[FOOTPRINT_OPTIONS];
     const char *why = cfg->beam.mode == BEAM_ADAPTIVE ? has_no_outlines(site->scene) : NULL;
     if (why != NULL)
         return sh_fail(err, SH_EINPUT, "%s: beam.mode: adaptive: %s; allowed here are single, rings and auto",
                        cfg->file, why);
-    if (forced) {
-        c.n = 1;
-        c.beam[0] = (struct beam_choice){cfg->beam.mode, cfg->beam.rings};
-        plan_beam_option(cfg->beam.mode, cfg->beam.rings, &c.option[0]);
-    } else {
-        list_beams(site, c.beam, c.option);
-    }
+    if (forced)
+        plan_beam_option(cfg->beam.mode, cfg->beam.rings, option);
+    else
+        list_beams(site, option);
     const int tries = config_has_footprint(cfg) && (!forced || site->measures);
-    int rc = tries ? try_beams(site, &c, report, err) : SH_OK;
+    int rc = tries ? try_beams(site, option, n, report, err) : SH_OK;
     if (rc != SH_OK) return rc;
-    const struct plan_choice ask = {"beam", c.option, c.n, forced ? 0 : -1, forced ? "beam.mode" : "", cfg->plan};
-    const uint32_t chosen = plan_choose(&ask, &site->plan.beam);
-    site->plan.methods.beam = c.beam[chosen].mode;
-    site->plan.methods.rings = c.beam[chosen].rings;
+    const struct plan_choice ask = {"beam", option, n, forced ? 0 : -1, forced ? "beam.mode" : "", cfg->plan};
+    const struct plan_option *chosen = &option[plan_choose(&ask, &site->plan.beam)];
+    site->plan.methods.beam = chosen->mode;
+    site->plan.methods.rings = chosen->rings;
     say_end_error(&site->plan.methods, &site->plan.beam);
     return SH_OK;
 }

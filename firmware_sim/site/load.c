@@ -221,8 +221,7 @@ void site_free(struct site *site)
     for (uint32_t i = 0; i < site->n_stations; i++) {
         struct site_station *s = &site->station[i];
         site_free_georeference(site, i);
-        free(s->beam);
-        beam_outlines_free(s->outlines);
+        site_free_beam(s);
         site_free_tripod(&s->tripod);
     }
     free(site->plan.row);

@@ -2,12 +2,10 @@
 /* Plausibility checks: values that are allowed, but hardly meant. Each gives one warning with its figures and the key
  * to look at. */
 #include <math.h>
-#include <stdlib.h>
 
 #include "core/angle.h"
 #include "core/distance.h"
 #include "core/mat3.h"
-#include "core/vec3.h"
 #include "drivers/protocol/protocol.h"
 #include "firmware_sim/config/config.h"
 #include "firmware_sim/site/steps.h"
@@ -20,7 +18,6 @@ static const double SMALL_M = 0.05, LARGE_M = 10000.0;
 static const double EMPTY_SHARE = 0.05;
 
 enum { LOOK_ACROSS = 32, LOOK_UP = 32, LOOKS = LOOK_ACROSS * LOOK_UP, MAX_LINES = 1000 };
-_Static_assert((int)LOOKS <= (int)BVH_CHUNK, "cast at once");
 
 /* Returns the program of the configured pulse rate. It gives the head's smallest and largest range. */
 static const struct config_program *program_of(const struct site *site)
@@ -147,24 +144,6 @@ static void check_reach(const struct site *site, uint32_t i, const struct sh_rep
 
 /* ---- the view of a station */
 
-struct look {
-    double x[LOOKS], y[LOOKS], z[LOOKS], range_m[LOOKS];
-    uint32_t triangle[LOOKS];
-};
-
-static void cast(const struct site *site, const struct site_station *s, struct bvh_work *work, struct look *look)
-{
-    const double *p = s->at.position_m;
-    const struct bvh_rays rays = {.n = LOOKS,
-                                  .from.at_m = {p[0], p[1], p[2]},
-                                  .dir = {look->x, look->y, look->z},
-                                  .range_max_m = 1e9,
-                                  .scattered = 1,
-                                  .range_m = look->range_m,
-                                  .triangle = look->triangle};
-    bvh_hits(work, site->bvh, &rays);
-}
-
 /* Warns of a head below its floor: then a surface is above it, and none under it. */
 static int check_floor(const struct site *site, uint32_t i, const struct sh_report *report, struct sh_err *err)
 {
@@ -184,60 +163,70 @@ static int check_floor(const struct site *site, uint32_t i, const struct sh_repo
     return SH_OK;
 }
 
-/* Chooses directions of pulses that are spread evenly over the first pan sweep. */
-static void fill_frame(const struct site *site, const struct site_station *s, struct look *look)
+/* Finds the mirror's and the pan's angle of a pulse; the pulses of all i are spread evenly over the first pan sweep. */
+static void aim_in_frame(const struct schedule_segment *segment, int i, double *mirror_rad, double *pan_rad)
 {
-    struct head_settings settings = site->cfg->head.settings;
-    struct schedule_spec spec;
-    struct schedule_segment segment;
     struct schedule_line line;
-    settings.frames = 1;
-    site_fill_spec(site, &settings, &spec);
-    schedule_start(&segment, &spec);
-    for (int i = 0; i < LOOKS; i++) {
-        uint64_t k = segment.end_pulse * (2 * (uint64_t)i + 1) / (2 * LOOKS);
-        schedule_get_line(&segment, schedule_line_of(&segment, k), &line);
-        if (line.cast0 < line.cast_end)
-            k = line.cast0 + (k - line.pulse0) * (line.cast_end - line.cast0) / (line.pulse_end - line.pulse0);
-        const double pan = angle_rad(360.0 * schedule_pan_turn(&segment, k));
-        const double mirror = angle_rad(360.0 * schedule_mirror_turn(&segment, k));
-        double dir[3];
-        mat3_apply(s->at.rotation, (const double[3]){sin(pan) * cos(mirror), cos(pan) * cos(mirror), sin(mirror)}, dir);
-        VEC3_SET(*look, i, dir);
-    }
+    uint64_t k = segment->end_pulse * (2 * (uint64_t)i + 1) / (2 * LOOKS);
+    schedule_get_line(segment, schedule_line_of(segment, k), &line);
+    if (line.cast0 < line.cast_end)
+        k = line.cast0 + (k - line.pulse0) * (line.cast_end - line.cast0) / (line.pulse_end - line.pulse0);
+    *pan_rad = angle_rad(360.0 * schedule_pan_turn(segment, k));
+    *mirror_rad = angle_rad(360.0 * schedule_mirror_turn(segment, k));
 }
 
-/* Chooses directions that are spread evenly over the window of a scan. */
-static void fill_window(const struct site *site, const struct site_station *s, struct look *look)
+/* The same for directions that are spread evenly over the window of a scan. */
+static void aim_in_window(const struct site *site, int i, double *line_rad, double *pan_rad)
 {
     const struct head_settings *set = &site->cfg->head.settings;
     const double pan_deg = 1e-6 * (double)(set->pan_stop_udeg - set->pan_start_udeg);
     const double line_deg = 1e-6 * (double)(set->line_stop_udeg - set->line_start_udeg);
-    for (int i = 0; i < LOOKS; i++) {
-        double across = (i % LOOK_ACROSS + 0.5) / LOOK_ACROSS, up = ((double)(i / LOOK_ACROSS) + 0.5) / LOOK_UP;
-        double pan = angle_rad(1e-6 * (double)set->pan_start_udeg + pan_deg * across);
-        double line = angle_rad(1e-6 * (double)set->line_start_udeg + line_deg * up), dir[3];
-        mat3_apply(s->at.rotation, (const double[3]){sin(pan) * cos(line), cos(pan) * cos(line), sin(line)}, dir);
-        VEC3_SET(*look, i, dir);
-    }
+    const double across = (i % LOOK_ACROSS + 0.5) / LOOK_ACROSS, up = ((double)(i / LOOK_ACROSS) + 0.5) / LOOK_UP;
+    *pan_rad = angle_rad(1e-6 * (double)set->pan_start_udeg + pan_deg * across);
+    *line_rad = angle_rad(1e-6 * (double)set->line_start_udeg + line_deg * up);
 }
 
-static void check_view(const struct site *site, uint32_t i, struct bvh_work *work, struct look *look,
-                       const struct sh_report *report)
+/* Returns the range of what is seen from a station in direction i of LOOKS; NaN: nothing is. sweep: the first pan
+ * sweep. */
+static double look(const struct site *site, const struct site_station *s, const struct schedule_segment *sweep, int i,
+                   struct bvh_work *work)
+{
+    const double *p = s->at.position_m;
+    double line, pan, dir[3], range_m;
+    uint32_t triangle;
+    if (site->emitter.kind == EMITTER_LINE)
+        aim_in_window(site, i, &line, &pan);
+    else
+        aim_in_frame(sweep, i, &line, &pan);
+    mat3_apply(s->at.rotation, (const double[3]){sin(pan) * cos(line), cos(pan) * cos(line), sin(line)}, dir);
+    const struct bvh_rays ray = {.n = 1,
+                                 .from.at_m = {p[0], p[1], p[2]},
+                                 .dir = {&dir[0], &dir[1], &dir[2]},
+                                 .range_max_m = 1e9,
+                                 .scattered = 1,
+                                 .range_m = &range_m,
+                                 .triangle = &triangle};
+    bvh_hits(work, site->bvh, &ray);
+    return range_m;
+}
+
+static void check_view(const struct site *site, uint32_t i, struct bvh_work *work, const struct sh_report *report)
 {
     const struct config_program *program = program_of(site);
     const struct site_station *s = &site->station[i];
     const double *p = s->at.position_m;
+    struct head_settings settings = site->cfg->head.settings;
+    struct schedule_spec spec;
+    struct schedule_segment sweep;
     int seen = 0, near = 0, far = 0;
-    if (site->emitter.kind == EMITTER_LINE)
-        fill_window(site, s, look);
-    else
-        fill_frame(site, s, look);
-    cast(site, s, work, look);
+    settings.frames = 1;
+    site_fill_spec(site, &settings, &spec);
+    schedule_start(&sweep, &spec);
     for (int k = 0; k < LOOKS; k++) {
-        near += look->range_m[k] < program->range_min_m;
-        far += look->range_m[k] > program->range_max_m;
-        seen += look->range_m[k] >= program->range_min_m && look->range_m[k] <= program->range_max_m;
+        const double range_m = look(site, s, &sweep, k, work);
+        near += range_m < program->range_min_m;
+        far += range_m > program->range_max_m;
+        seen += range_m >= program->range_min_m && range_m <= program->range_max_m;
     }
     if (near > LOOKS / 2)
         sh_warn(
@@ -260,18 +249,16 @@ static void check_view(const struct site *site, uint32_t i, struct bvh_work *wor
 static int check_stations(const struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const uint32_t step = site->n_stations / CONFIG_MAX_STATIONS + 1;
-    struct look *look = malloc(sizeof *look);
-    struct bvh_work *work = NULL;
-    int rc = look != NULL ? bvh_work_create(&work, err) : sh_fail(err, SH_ENOMEM, "no memory to look from stations");
+    struct bvh_work *work;
+    int rc = bvh_work_create(&work, err);
     for (uint32_t i = 0; i < site->n_stations && rc == SH_OK && !site->moving; i += step) {
         if (!config_serves(site->cfg, i)) continue;
         check_reach(site, i, report);
         if (site->n_movers > 0) continue;
         rc = check_floor(site, i, report, err);
-        if (rc == SH_OK) check_view(site, i, work, look, report);
+        if (rc == SH_OK) check_view(site, i, work, report);
     }
     bvh_work_free(work);
-    free(look);
     return rc;
 }
 

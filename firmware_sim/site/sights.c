@@ -5,7 +5,6 @@
 #include "firmware_sim/site/view.h"
 
 #include <stdatomic.h>
-#include <stdlib.h>
 #include <string.h>
 
 enum { LINES = 64 };
@@ -89,14 +88,8 @@ static int make(struct site *site, uint32_t station, uint32_t of, const struct s
                               .sees = site_view_sees,
                               .ctx = &view};
     memcpy(spec.station_m, s->at.position_m, sizeof spec.station_m);
-    s->sight_users = malloc(sizeof *s->sight_users);
-    if (s->sight_users == NULL) return sh_fail(err, SH_ENOMEM, "no memory for a map");
-    atomic_init(s->sight_users, 1);
     int rc = sight_create(&spec, cfg->loop.threads, report, &sight, &why);
-    if (rc == SH_OK)
-        s->sight = sight;
-    else
-        free(s->sight_users);
+    s->sight = sight;
     if (rc == SH_ESTOPPED) return sh_fail_stopped(err);
     return rc == SH_OK ? rc
                        : sh_fail(err, rc, "%s: station %u %s: %.300s; cast.sight: off needs no map", cfg->file,
@@ -105,11 +98,7 @@ static int make(struct site *site, uint32_t station, uint32_t of, const struct s
 
 static void close_sight(struct site_station *s)
 {
-    struct sight *sight = s->sight;
-    s->sight = NULL;
-    if (sight == NULL || atomic_fetch_sub(s->sight_users, 1) != 1) return;
-    sight_free(sight);
-    free(s->sight_users);
+    sight_free(atomic_exchange(&s->sight, NULL));
 }
 
 /* Whether a map can be reused: it depends on the BVH, the place and the directions of rays. The map's fineness changes
@@ -125,12 +114,8 @@ static int still_holds(const struct site *site, const struct site *from, uint32_
 void site_share_sights(struct site *site, const struct site *from)
 {
     if (!site->plan.methods.sight) return;
-    for (uint32_t i = 0; i < site->n_stations; i++) {
-        if (!still_holds(site, from, i)) continue;
-        atomic_fetch_add(from->station[i].sight_users, 1);
-        site->station[i].sight_users = from->station[i].sight_users;
-        site->station[i].sight = from->station[i].sight;
-    }
+    for (uint32_t i = 0; i < site->n_stations; i++)
+        if (still_holds(site, from, i)) site->station[i].sight = sight_share(from->station[i].sight);
 }
 
 int site_open_sights(struct site *site, uint32_t first, uint32_t n, const struct sh_report *report, struct sh_err *err)

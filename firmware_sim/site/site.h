@@ -44,13 +44,11 @@ struct site_tripod {
 struct site_station {
     const struct config_station *station; /* of the configuration, or of stops */
     struct sight *_Atomic sight;          /* its visibility map; NULL: rays go to the BVH (site_open_sights) */
-    _Atomic uint32_t *sight_users;        /* sites that share the map */
     struct georef *georef;
     struct placement at;
     struct site_tripod tripod;
-    struct cast_beam *beam;         /* NULL: one ray per pulse */
-    struct beam_outlines *outlines; /* of an adaptive beam */
-    double scale[3];                /* of geo points on the wire, units of the CRS per count */
+    struct cast_beam *beam; /* with outlines of its own where it is adaptive; NULL: one ray per pulse */
+    double scale[3];        /* of geo points on the wire, units of the CRS per count */
     struct site_on_stretch
         *on_stretch;      /* [n_stretches] of a trajectory, in the geo layout; else, or with another scanner, NULL */
     struct plan_row plan; /* how the georef's method was chosen; of the worst stretch */

@@ -104,6 +104,8 @@ void site_free_georeference(struct site *site, uint32_t station);
  * leaves beam or optics open, methods are measured on the scene. For `plan` (site->measures) the error of a method that
  * the configuration forces is measured, too. Warns where no method holds the tolerances. */
 int site_choose_methods(struct site *site, const struct sh_report *report, struct sh_err *err);
+/* Frees a station's beam, and its outlines. */
+void site_free_beam(struct site_station *station);
 
 /* ---- sights.c: the visibility maps of stations */
 /* Called after beam and optics are chosen. Sets site->plan.methods.sight and the row. */

@@ -291,9 +291,12 @@ static void test_figures(void **state)
     struct plan_place place = {
         .setup = rig.setup, .beam = &rig.beam, .segment = rig.segment, .pulses = view.lines * view.pulses};
     assert_int_equal(plan_sample_create(&(struct plan_places){&place, 1}, NULL, &sample, &err), SH_OK);
-    plan_sample_beam(sample, BEAM_SINGLE, 0, &single);
-    plan_sample_beam(sample, BEAM_ADAPTIVE, 4, &adaptive);
-    plan_sample_beam(sample, BEAM_RINGS, 2, &rings);
+    plan_beam_option(BEAM_SINGLE, 0, &single);
+    plan_sample_beam(sample, &single);
+    plan_beam_option(BEAM_ADAPTIVE, 4, &adaptive);
+    plan_sample_beam(sample, &adaptive);
+    plan_beam_option(BEAM_RINGS, 2, &rings);
+    plan_sample_beam(sample, &rings);
     double sigma = sqrt(share / 32768.0);
     printf(
         "# a step: two echoes in %.3f %% of the pulses; single rays are wrong in %.3f %%, 19 sub-rays in %.3f %%, the "
@@ -337,7 +340,8 @@ static void test_small_steps(void **state)
     struct plan_place place = {
         .setup = rig.setup, .beam = &rig.beam, .segment = rig.segment, .pulses = view.lines * view.pulses};
     assert_int_equal(plan_sample_create(&(struct plan_places){&place, 1}, NULL, &sample, &err), SH_OK);
-    plan_sample_beam(sample, BEAM_SINGLE, 0, &single);
+    plan_beam_option(BEAM_SINGLE, 0, &single);
+    plan_sample_beam(sample, &single);
     const double above = (single.error_m * single.error_m - mean2) / sigma;
     printf("# a step of 4 mm: single rays are wrong by %.3f mm RMS, said %.3f mm: %.2f standard errors above\n",
            1e3 * sqrt(mean2), 1e3 * single.error_m, above);

@@ -12,8 +12,10 @@
 static const struct plan_tolerance TOLERANCE = {1e-3, 1e-2};
 
 enum { N = 4 };
-static const struct plan_option options[N] = {
-    {"a", 2e-3, 0.0, 1.0, ""}, {"b", 1e-3, 2e-2, 2.0, ""}, {"c", 1e-4, 1e-3, 9.0, ""}, {"d", 1e-4, 1e-2, 5.0, ""}};
+static const struct plan_option options[N] = {{"a", 2e-3, 0.0, 1.0, "", BEAM_SINGLE, 0},
+                                              {"b", 1e-3, 2e-2, 2.0, "", BEAM_SINGLE, 0},
+                                              {"c", 1e-4, 1e-3, 9.0, "", BEAM_SINGLE, 0},
+                                              {"d", 1e-4, 1e-2, 5.0, "", BEAM_SINGLE, 0}};
 
 static void expect(const struct plan_row *row, const char *method, int forced, const char *why)
 {
@@ -69,18 +71,19 @@ static void test_least_off(void **state)
 {
     (void)state;
     struct plan_row row;
-    struct plan_option some[3] = {options[1], options[0], {"e", (double)NAN, (double)NAN, 0.1, ""}};
+    struct plan_option some[3] = {options[1], options[0], {"e", (double)NAN, (double)NAN, 0.1, "", BEAM_SINGLE, 0}};
     some[0].echo_share = 3e-2;
     assert_int_equal(choose(&row, "beam", some, 3, -1, ""), 1);
     expect(&row, "a", 0, "the one with the least error; does not hold");
     /* Five times the allowed range error is worse than twice the share of other echo counts. */
-    const struct plan_option two[2] = {{"f", 5e-3, 0.0, 1.0, ""}, {"g", 1e-4, 2e-2, 2.0, ""}};
+    const struct plan_option two[2] = {{"f", 5e-3, 0.0, 1.0, "", BEAM_SINGLE, 0},
+                                       {"g", 1e-4, 2e-2, 2.0, "", BEAM_SINGLE, 0}};
     assert_int_equal(choose(&row, "beam", two, 2, -1, ""), 1);
     /* Options go from rough to exact. If all miss by as much, the last possible one is chosen. */
-    struct plan_option same[4] = {{"none", 0.0, 1.0, 0.0, ""},
-                                  {"1", 0.0, 1.0, 1.0, ""},
-                                  {"2", 0.0, 1.0, 2.0, ""},
-                                  {"3", 0.0, 1.0, 3.0, "not here"}};
+    struct plan_option same[4] = {{"none", 0.0, 1.0, 0.0, "", BEAM_SINGLE, 0},
+                                  {"1", 0.0, 1.0, 1.0, "", BEAM_SINGLE, 0},
+                                  {"2", 0.0, 1.0, 2.0, "", BEAM_SINGLE, 0},
+                                  {"3", 0.0, 1.0, 3.0, "not here", BEAM_SINGLE, 0}};
     assert_int_equal(choose(&row, "optics", same, 4, -1, ""), 2);
 }
 
@@ -89,7 +92,8 @@ static void test_what_cannot_be_had(void **state)
 {
     (void)state;
     struct plan_row row;
-    struct plan_option some[2] = {{"e", (double)NAN, (double)NAN, 0.0, ""}, {"f", 0.0, 0.0, 0.0, "the head moves"}};
+    struct plan_option some[2] = {{"e", (double)NAN, (double)NAN, 0.0, "", BEAM_SINGLE, 0},
+                                  {"f", 0.0, 0.0, 0.0, "the head moves", BEAM_SINGLE, 0}};
     assert_int_equal(choose(&row, "beam", some, 2, -1, ""), 0);
     expect(&row, "e", 0, "the only possible one; its error is not known");
     expect_left(&row, 0, "f", "the head moves");
