@@ -2,6 +2,7 @@
 # scanhead. `make` builds build/scanhead, build/scanheadd and build/libscanhead.{a,so}.
 # `make demo` and `make test` install what is missing (Debian; sudo when not root), build and run.
 BUILD ?= build
+$(if $(filter 1,$(words $(BUILD))),,$(error BUILD="$(BUILD)": a path without blanks is allowed))
 PREFIX ?= /usr/local
 # For another machine: CROSS_COMPILE=aarch64-linux-gnu-, or a compiler whose name or --target says it. Tools that are
 # not given have the same prefix.
@@ -337,7 +338,7 @@ test: deps-test
 else
 ONE = $(patsubst $(BUILD)/%,%,$(filter %/$(T),$(TESTS)))
 SCRIPT = $(wildcard tests/$(T).sh tests/guest/$(T).sh tests/page/$(T).sh)
-test: deps
+test: $(if $(ONE)$(SCRIPT),deps)
 	@[ -n '$(ONE)$(SCRIPT)' ] || { echo "T=$(T): no tests/*/$(T).c, and no $(T).sh in tests, tests/guest or tests/page" >&2; exit 2; }
 	$(SUBMAKE) $(STRICT) BUILD=$(BUILD)/test $(if $(filter-out tests/unit/%,$(ONE))$(SCRIPT),all $(BUILD)/test/bench) $(ONE:%=$(BUILD)/test/%) \
 		$(if $(filter tests/guest/%,$(SCRIPT)),$(patsubst $(BUILD)/%,$(BUILD)/test/%,$(call PROGRAMS,guest)))
@@ -475,38 +476,54 @@ IFC_FILES = $(addprefix node_modules/web-ifc/,package.json LICENSE.md web-ifc-ap
 # BUILT=yes installs existing files, whatever flags they were built with and by whichever user.
 BUILT ?= no
 #? install           into PREFIX=/usr/local, below DESTDIR; BUILT=yes builds nothing
-install: export GIVEN_PREFIX = $(PREFIX)
-install: $(if $(filter yes,$(BUILT)),,all)
-	@case "$$GIVEN_PREFIX" in *[\"\$$\`\\\|\&\#[:cntrl:]]*) \
-		printf '%s\n' 'make install: PREFIX has a character of "$$`\|&# or a control character; all others are allowed' >&2; exit 1;; esac
-	install -d "$(DESTDIR)$(PREFIX)/bin" "$(DESTDIR)$(PREFIX)/$(LIB)" "$(DESTDIR)$(PREFIX)/include" "$(DESTDIR)$(HEADS_DIR)" \
-		"$(DESTDIR)$(SCENES_DIR)" "$(DESTDIR)$(FAULTS_DIR)" "$(DESTDIR)$(CAMPAIGN_DIR)" "$(DESTDIR)$(UDEV_DIR)" "$(DESTDIR)$(PC_DIR)" "$(DESTDIR)$(PREFIX)/share/scanhead/python" \
-		"$(DESTDIR)$(WIRESHARK_DIR)" "$(DESTDIR)$(UNIT_DIR)" "$(DESTDIR)$(COMPLETION_DIR)" \
-		"$(DESTDIR)$(MAN_DIR)/man1" "$(DESTDIR)$(MAN_DIR)/man3" "$(DESTDIR)$(MAN_DIR)/man5"
-	install $(BUILD)/scanhead $(BUILD)/scanheadd "$(DESTDIR)$(PREFIX)/bin/"
-	install -m 644 $(BUILD)/libscanhead.a "$(DESTDIR)$(PREFIX)/$(LIB)/"
-	install $(BUILD)/libscanhead.so "$(DESTDIR)$(PREFIX)/$(LIB)/libscanhead.so.1"
-	ln -sf libscanhead.so.1 "$(DESTDIR)$(PREFIX)/$(LIB)/libscanhead.so"
-	install -m 644 drivers/host/scanhead.h "$(DESTDIR)$(PREFIX)/include/"
-	install -m 644 drivers/host/python/scanhead.py "$(DESTDIR)$(PREFIX)/share/scanhead/python/"
-	install -m 644 drivers/protocol/wireshark/scanhead.lua "$(DESTDIR)$(WIRESHARK_DIR)/"
-	install -m 644 config/heads/*.yaml "$(DESTDIR)$(HEADS_DIR)/"
-	install -m 644 config/scenes/glass_room.obj "$(DESTDIR)$(SCENES_DIR)/"
-	install -m 644 config/faults/*.yaml "$(DESTDIR)$(FAULTS_DIR)/"
-	install config/campaign/*.sh "$(DESTDIR)$(CAMPAIGN_DIR)/"
-	install -d "$(DESTDIR)$(IFC_DIR)"
-	install -m 644 core/import/ifc/*.mjs core/import/ifc/package.json core/import/ifc/package-lock.json core/import/ifc/.npmrc "$(DESTDIR)$(IFC_DIR)/"
-	if [ -n '$(IFC_BUILT)' ]; then (cd "$(IFC_BUILT)" && tar -cf - $(IFC_FILES)) | (cd "$(DESTDIR)$(IFC_DIR)" && tar --no-same-owner -xf -); \
+check-place: export GIVEN_PREFIX = $(PREFIX)
+check-place: export GIVEN_DESTDIR = $(DESTDIR)
+check-place:
+	@case "$$GIVEN_PREFIX$$GIVEN_DESTDIR" in *[\"\$$\`\\\|\&\#[:cntrl:]]*) \
+		printf '%s\n' 'make install: PREFIX or DESTDIR has a character of "$$`\|&# or a control character; all others are allowed' >&2; exit 1;; esac
+	@case "$$GIVEN_PREFIX" in ""|/*) ;; *) \
+		printf '%s\n' "make install: PREFIX=$$GIVEN_PREFIX is relative; a path that begins with / is allowed" >&2; exit 1;; esac
+INSTALL_LIST = $(PREFIX)/share/scanhead/installed.txt
+# A trial (make -n) makes no folder.
+IS_TRIAL = $(findstring n,$(filter-out --%,$(firstword -$(MAKEFLAGS))))
+install: check-place $(if $(filter yes,$(BUILT)),,all)
+	$(eval STAGE := $(if $(IS_TRIAL),STAGE,$(shell mktemp -d)))
+	@umask 022; $(MAKE) --no-print-directory stage STAGE="$(STAGE)" || { rm -rf "$(STAGE)"; exit 1; }
+	@sh config/packaging/install.sh "$(STAGE)" "$(DESTDIR)" "$(INSTALL_LIST)"
+#? uninstall         removes what make install has put below PREFIX and DESTDIR
+uninstall: check-place
+	@sh config/packaging/install.sh --remove "$(DESTDIR)" "$(INSTALL_LIST)"
+# All that is installed is put into STAGE first, so that nothing is installed where a part is missing.
+stage:
+	install -d "$(STAGE)$(PREFIX)/bin" "$(STAGE)$(PREFIX)/$(LIB)" "$(STAGE)$(PREFIX)/include" "$(STAGE)$(HEADS_DIR)" \
+		"$(STAGE)$(SCENES_DIR)" "$(STAGE)$(FAULTS_DIR)" "$(STAGE)$(CAMPAIGN_DIR)" "$(STAGE)$(UDEV_DIR)" "$(STAGE)$(PC_DIR)" "$(STAGE)$(PREFIX)/share/scanhead/python" \
+		"$(STAGE)$(WIRESHARK_DIR)" "$(STAGE)$(UNIT_DIR)" "$(STAGE)$(COMPLETION_DIR)" \
+		"$(STAGE)$(MAN_DIR)/man1" "$(STAGE)$(MAN_DIR)/man3" "$(STAGE)$(MAN_DIR)/man5"
+	install $(BUILD)/scanhead $(BUILD)/scanheadd "$(STAGE)$(PREFIX)/bin/"
+	install -m 644 $(BUILD)/libscanhead.a "$(STAGE)$(PREFIX)/$(LIB)/"
+	install $(BUILD)/libscanhead.so "$(STAGE)$(PREFIX)/$(LIB)/libscanhead.so.1"
+	ln -sf libscanhead.so.1 "$(STAGE)$(PREFIX)/$(LIB)/libscanhead.so"
+	install -m 644 drivers/host/scanhead.h "$(STAGE)$(PREFIX)/include/"
+	install -m 644 drivers/host/python/scanhead.py "$(STAGE)$(PREFIX)/share/scanhead/python/"
+	install -m 644 drivers/protocol/wireshark/scanhead.lua "$(STAGE)$(WIRESHARK_DIR)/"
+	install -m 644 config/heads/*.yaml "$(STAGE)$(HEADS_DIR)/"
+	install -m 644 config/scenes/glass_room.obj "$(STAGE)$(SCENES_DIR)/"
+	install -m 644 config/faults/*.yaml "$(STAGE)$(FAULTS_DIR)/"
+	install config/campaign/*.sh "$(STAGE)$(CAMPAIGN_DIR)/"
+	install -d "$(STAGE)$(IFC_DIR)"
+	install -m 644 core/import/ifc/*.mjs core/import/ifc/package.json core/import/ifc/package-lock.json core/import/ifc/.npmrc "$(STAGE)$(IFC_DIR)/"
+	if [ -n '$(IFC_BUILT)' ]; then for f in $(IFC_FILES); do install -D -m 644 "$(IFC_BUILT)/$$f" "$(STAGE)$(IFC_DIR)/$$f" || exit; done; \
 	else echo "without the readers of IFC, which npm did not install: Assimp reads it"; fi
-	install -m 644 drivers/host/70-scanhead.rules "$(DESTDIR)$(UDEV_DIR)/"
-	sed "s|@PREFIX@|$(subst %,%%,$(PREFIX))|" config/packaging/scanhead@.service.in > "$(DESTDIR)$(UNIT_DIR)/scanhead@.service"
-	pages=$$($(PRINTER) help --man list) && for p in $$pages; do \
-		$(PRINTER) help --man $$p > "$(DESTDIR)$(MAN_DIR)/man$${p##*.}/$$p" || exit; done
-	echo ".so man1/scanhead.1" > "$(DESTDIR)$(MAN_DIR)/man1/scanheadd.1"
-	awk -f drivers/host/libscanhead.3.awk drivers/host/scanhead.h > "$(DESTDIR)$(MAN_DIR)/man3/libscanhead.3"
-	$(PRINTER) help --completion bash > "$(DESTDIR)$(COMPLETION_DIR)/scanhead"
+	install -D -m 644 LICENSE "$(STAGE)$(PREFIX)/share/doc/scanhead/LICENSE"
+	install -m 644 drivers/host/70-scanhead.rules "$(STAGE)$(UDEV_DIR)/"
+	sed "s|@PREFIX@|$(subst %,%%,$(PREFIX))|" config/packaging/scanhead@.service.in > "$(STAGE)$(UNIT_DIR)/scanhead@.service"
+	for program in $(PRINTER)d $(PRINTER); do \
+		pages=$$($$program help --man list) && for p in $$pages; do \
+			$$program help --man $$p > "$(STAGE)$(MAN_DIR)/man$${p##*.}/$$p" || exit; done && \
+		$$program help --completion bash > "$(STAGE)$(COMPLETION_DIR)/$${program##*/}" || exit; done
+	awk -f drivers/host/libscanhead.3.awk drivers/host/scanhead.h > "$(STAGE)$(MAN_DIR)/man3/libscanhead.3"
 	sed "s|@PREFIX@|$(PREFIX)|; s|@LIB@|$(LIB)|; s|@VERSION@|$$(sed -n 's/^#define SCANHEAD_VERSION  *"\(.*\)"$$/\1/p' \
-		drivers/host/scanhead.h)|" drivers/host/libscanhead.pc.in > "$(DESTDIR)$(PC_DIR)/libscanhead.pc"
+		drivers/host/scanhead.h)|" drivers/host/libscanhead.pc.in > "$(STAGE)$(PC_DIR)/libscanhead.pc"
 #? format            clang-format on all sources
 format:
 	clang-format -i $$(git ls-files '*.c' '*.h' '*.cpp')
@@ -517,6 +534,6 @@ clean:
 help:
 	@sed -n 's/^#? /make /p' $(filter Makefile %.mk,$(MAKEFILE_LIST))
 .PHONY: ALWAYS all scanheadd ifc-readers deps deps-test deps-build deps-guest deps-browser demo test test-unit test-wire test-accuracy test-stability test-guest soak-usb repair \
-	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-copies bench-velodyne bench-waves bench-waveform bench-page page-pictures bench-loop bench-loading bench-kernels bench-panorama bench-helios chart install format clean help
+	test-usb-million test-hostile test-sight objects test-unit-programs test-programs bench bench-beam bench-plain bench-copies bench-velodyne bench-waves bench-waveform bench-page page-pictures bench-loop bench-loading bench-kernels bench-panorama bench-helios chart install uninstall check-place stage format clean help
 .SECONDARY:
 -include $(shell find $(patsubst %,$(BUILD)/%,core drivers firmware_sim tests) -name '*.d' 2>/dev/null)

@@ -32,9 +32,40 @@ odd_prefixes() {
             "$work/odd/opt/100%h/lib/systemd/system/scanhead@.service" || return
     for odd in '|' '&' '"' '`' '#' '\' '$$' "$(printf '\t')"; do
         install_it "$work/refused" "/opt/a${odd}b" 2>"$work/said" && { echo "$odd is taken"; return 1; }
-        grep -qF 'make install: PREFIX has a character of "$`\|&#' "$work/said" && test ! -e "$work/refused" ||
+        grep -qF 'make install: PREFIX or DESTDIR has a character of "$`\|&#' "$work/said" && test ! -e "$work/refused" ||
             { cat "$work/said"; return 1; }
     done
+    install_it "$work/refused" opt/a 2>"$work/said" && { echo "a relative one is taken"; return 1; }
+    grep -qF 'PREFIX=opt/a is relative' "$work/said" && test ! -e "$work/refused"
+}
+
+# With the strictest umask all can read what is there, and run what runs for its owner.
+all_can_read() {
+    mkdir "$work/strict" && (umask 077 && install_it "$work/strict" /opt/a) || return
+    find "$work/strict/opt/a" ! -type l \( -type d ! -perm 755 -o -type f ! -perm 644 ! -perm 755 \) | grep . && return 1
+    test -x "$work/strict/opt/a/bin/scanheadd"
+}
+
+# `make uninstall` leaves what others have put beside the files. A file of an older release goes with the next one.
+uninstalls() {
+    root=$work/strict/opt/a list=$work/strict/opt/a/share/scanhead/installed.txt
+    : >"$root/bin/other" && : >"$root/share/scanhead/heads/old.yaml" && : >"$root/share/scanhead/heads/mine.yaml" &&
+        echo /opt/a/share/scanhead/heads/old.yaml >>"$list" && install_it "$work/strict" /opt/a &&
+        test ! -e "$root/share/scanhead/heads/old.yaml" || { echo "an older file stays"; return 1; }
+    uninstall_it || return
+    left=$(cd "$root" && find . ! -type d | sort | tr '\n' ' ')
+    test "$left" = "./bin/other ./share/scanhead/heads/mine.yaml " || { echo "left: $left"; return 1; }
+    ! uninstall_it 2>"$work/said" && grep -qF "make uninstall: no $list" "$work/said"
+}
+uninstall_it() {
+    env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -s uninstall DESTDIR="$work/strict" PREFIX=/opt/a
+}
+
+# Where a file is missing, nothing is installed.
+all_or_nothing() {
+    mkdir "$work/part" && cp "$(dirname "$program")/scanhead" "$work/part/" && mkdir "$work/nothing" &&
+        ! env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -s install BUILT=yes BUILD="$work/part" DESTDIR="$work/nothing" \
+            2>"$work/said" && test -z "$(ls "$work/nothing")"
 }
 
 config() {
@@ -86,6 +117,9 @@ sed -n '/^```c /,/^```$/p' README.md | sed "/^\`\`\`/d" >"$work/client.c"
 check "make install" install_it "$work/root" "$prefix"
 check "make install into folders with blanks in their names" blanks_stay
 check "a prefix with a percent sign, and prefixes that are refused" odd_prefixes
+check "all can read it, whatever the umask" all_can_read
+check "make uninstall" uninstalls
+check "where a file is missing, nothing is installed" all_or_nothing
 check "the udev rule is where udev looks below a prefix" test -s "$work/root$prefix/lib/udev/rules.d/70-scanhead.rules"
 check "the dissector for Wireshark is where its README says" cmp drivers/protocol/wireshark/scanhead.lua \
     "$work/root$prefix/share/scanhead/wireshark/scanhead.lua"
@@ -99,15 +133,18 @@ check "the installed program's example passes its check" example_passes
 # of the service.
 has_pages() {
     share=$work/root$prefix/share
-    for page in $("$work/root$prefix/bin/scanhead" help --man list); do
-        "$work/root$prefix/bin/scanhead" help --man "$page" | cmp - "$share/man/man${page##*.}/$page" || return
+    for name in scanhead scanheadd; do
+        for page in $("$work/root$prefix/bin/$name" help --man list | grep "^$name[.-][^y]"); do
+            "$work/root$prefix/bin/$name" help --man "$page" | cmp - "$share/man/man${page##*.}/$page" || return
+        done
+        "$work/root$prefix/bin/$name" help --completion bash | cmp - "$share/bash-completion/completions/$name" || return
     done
     for function in $(sed -n 's/^[a-z].*[ *]\(scanhead_[a-z_]*\)(.*/\1/p' drivers/host/scanhead.h); do
         grep -q "$function(" "$share/man/man3/libscanhead.3" || { echo "libscanhead.3: no $function"; return 1; }
     done
+    "$work/root$prefix/bin/scanhead" help --man scanhead.yaml.5 | cmp - "$share/man/man5/scanhead.yaml.5" || return
     ! command -v groff >/dev/null || test -z "$(groff -man -Tutf8 -ww -z "$share/man/man3/libscanhead.3" 2>&1)" || return
-    "$work/root$prefix/bin/scanhead" help --completion bash | cmp - "$share/bash-completion/completions/scanhead" &&
-        grep -qxF "ExecStart=\"$prefix/bin/scanhead\" run /etc/scanhead/%i.yaml" "$work/root$prefix/lib/systemd/system/scanhead@.service"
+    grep -qxF "ExecStart=\"$prefix/bin/scanhead\" run /etc/scanhead/%i.yaml" "$work/root$prefix/lib/systemd/system/scanhead@.service"
 }
 check "manual pages, a completion and a unit for the service" has_pages
 # The modules are there where npm has installed them.
@@ -117,9 +154,8 @@ has_ifc_readers() {
     ls "$(dirname "$program")/ifc/installed" "$(dirname "$program")/../ifc/installed" >"$work/ls" 2>/dev/null
     [ ! -s "$work/ls" ] || test -s "$ifc/node_modules/web-ifc/web-ifc-node.wasm" -a -s "$ifc/node_modules/@ifc-lite/wasm/pkg/ifc-lite_bg.wasm"
 }
-check "scanheadd comes with it, and a page that leads to scanhead's" test \
-    "$("$work/root$prefix/bin/scanheadd" --version):$(cat "$work/root$prefix/share/man/man1/scanheadd.1")" = \
-    "$("$work/root$prefix/bin/scanhead" --version | sed 's/^scanhead /scanheadd /'):.so man1/scanhead.1"
+check "scanheadd comes with it" test "$("$work/root$prefix/bin/scanheadd" --version)" = \
+    "$("$work/root$prefix/bin/scanhead" --version | sed 's/^scanhead /scanheadd /')"
 check "the readers of IFC come with it" has_ifc_readers
 check "scripts for campaigns come with it" test -x "$work/root$prefix/share/scanhead/campaign/slurm.sh" -a \
     -x "$work/root$prefix/share/scanhead/campaign/parallel.sh"
