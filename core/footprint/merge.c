@@ -60,6 +60,7 @@ static int set_gains(const struct beam_merging *how, struct beam_return *r, uint
         first_m = fmin(first_m, r[i].plane_m);
         last_m = fmax(last_m, r[i].plane_m);
     }
+    /* A return that is not received has no weight, wherever its plane meets the axis. */
     if (near_m >= how->least_m && !beam_is_deep(how->signal, near_m, far_m - near_m, last_m - first_m)) return 0;
     for (uint32_t i = 0; i < n; i++)
         r[i].gain = r[i].range_m < how->least_m ? 0.0 : gain_at(how, fmax(r[i].plane_m, how->least_m));
