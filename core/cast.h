@@ -72,10 +72,10 @@ struct cast_detect {
     const struct detect_ball *ball;
 };
 
-/* A beam with a footprint (core/footprint.h). Constant; any thread. With cast_detect, echoes are weighted
- * by the power that comes back. Each is detected, and has noise, by itself. Where any part of an adaptive
- * beam's footprint lies on glass or a mirror, the footprint is cast as rings: the outlines of what is seen there are
- * not known. */
+/* A beam with a footprint (core/footprint.h). Constant; any thread. With cast_detect, echoes are weighted by the power
+ * that comes back, with a signal by the power received. Each is detected, and has noise, by itself. Where any part of
+ * an adaptive beam's footprint lies on glass or a mirror, the footprint is cast as rings: the outlines of what is seen
+ * there are not known. */
 struct cast_beam {
     struct beam beam;
     enum beam_mode mode; /* BEAM_RINGS or BEAM_ADAPTIVE. Adaptive needs outlines, a head and a scene that stand still, a

@@ -68,6 +68,7 @@ struct detect_signal {
     uint32_t n;
     double g0, at_m[DETECT_MAX_REACHES], more_1_m[DETECT_MAX_REACHES];
     double per_overlap2, extinction2_1_m;
+    double steepest_1_m;    /* log A changes with range by at most 2 / R plus this */
     double per_snr;         /* 1/k; 0: sharp */
     double floor2, jitter2; /* parts of sigma^2: the constant one, and the other one at A = 1 */
     double per_distance;

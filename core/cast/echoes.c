@@ -79,8 +79,11 @@ static uint32_t merge_pulse(struct echo_list *l, const struct beam_merging *how,
     uint32_t to = 0;
     for (uint32_t j = 0; j < n; j++) {
         uint32_t i = echoes_place_of(f, j);
-        r[j] = (struct beam_return){
-            .range_m = l->range_m[i], .energy = l->rho[i], .back = l->rho[i], .label = l->label[i]};
+        r[j] = (struct beam_return){.range_m = l->range_m[i],
+                                    .energy = l->rho[i],
+                                    .back = l->rho[i],
+                                    .label = l->label[i],
+                                    .plane_m = l->range_m[i]};
         if (texels) r[j].colour = l->colour[i];
     }
     for (uint32_t j = 0, end; j < n; j = end) {
@@ -109,7 +112,8 @@ static void weigh_returns(struct caster *c, const struct chunk *k)
 {
     const struct cast_detect *d = k->s->detect;
     struct echo_list *l = &c->list;
-    const struct beam_merging how = {.gap_m = d->separation_m, .pulse_m = k->s->pulse_m, .most = LINE_MAX_ECHOES};
+    const struct beam_merging how = {
+        .gap_m = d->separation_m, .pulse_m = k->s->pulse_m, .most = LINE_MAX_ECHOES, .signal = d->signal};
     if (d->surfaces == NULL) {
         for (uint32_t i = 0; i < k->n; i++)
             l->rho[i] = 1.0;

@@ -41,6 +41,11 @@ int caster_goes_on(const struct cast_setup *s, uint32_t label);
 void caster_normal(const struct cast_setup *s, uint8_t body, uint32_t triangle, double n[3]);
 /* Returns 1 for a bare pane or mirror, which sends nothing back: it has no echo, with or without a signal model. */
 int caster_is_bare(const struct cast_setup *s, uint32_t label, double rho);
+/* Returns the signal that a head models, or NULL. */
+static inline const struct detect_signal *caster_signal(const struct cast_setup *s)
+{
+    return s->detect != NULL ? s->detect->signal : NULL;
+}
 /* Follows up to CHUNK rays through glass and off mirrors. The rays' hits are chains in p. */
 void caster_follow(struct nearest *w, const struct cast_setup *s, const struct ray_hits *first, struct path_rays *p);
 

@@ -113,6 +113,7 @@ static int known_centre(const struct caster *c, const struct chunk *k, struct jo
     const struct sub_ray ray = sub_ray(&k->s->beam->beam, &job->sight, from_m, part->x, part->y);
     vec3_sub(ray.from_m, bvh_origin(bvh), from_m);
     r->range_m = (tri->d - vec3_dot(tri->n, from_m)) / vec3_dot(tri->n, ray.dir);
+    r->plane_m = c->list.range_m[p];
     r->energy = part->energy;
     r->sigma_m = k->spreads ? beam_part_sigma(&k->s->beam->beam, &job->sight, tri->n, r->range_m, part) : 0.0f;
     r->label = c->list.label[p];

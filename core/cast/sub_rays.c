@@ -7,6 +7,7 @@
 #include "core/cast/kernels_points.h"
 #include "core/cast/waves.h"
 #include "core/surface.h"
+#include "core/vec3.h"
 
 /* Finds how much comes back from the surfaces that rays from `first` on have hit. */
 static void weigh_pool(struct caster *c, const struct cast_setup *s, uint32_t first)
@@ -127,8 +128,38 @@ static float hit_sigma(const struct caster *c, const struct cast_setup *s, const
     return beam_part_sigma(beam, &job->sight, plane.n, p->range_m[i], &part);
 }
 
-/* Adds the hits of sub-ray i of a job. */
-static void add_hits(struct caster *c, const struct chunk *k, const struct job *job, uint32_t i)
+/* Returns whether the first hits of a job may make an echo that depends on their distances. Hits behind glass are not
+ * looked at: where there is glass, the answer is yes. */
+static int is_deep(const struct caster *c, const struct cast_setup *s, const struct job *job)
+{
+    const double *range_m = c->sub_rays->pool.range_m;
+    double near_m = job->centre.energy > 0.0 ? job->centre.range_m : (double)INFINITY;
+    double far_m = job->centre.energy > 0.0 ? job->centre.range_m : 0.0;
+    if (caster_signal(s) == NULL || s->detect->depth > 0) return caster_signal(s) != NULL;
+    for (uint32_t i = job->first; i < job->first + job->n; i++) {
+        near_m = range_m[i] < near_m ? range_m[i] : near_m;
+        far_m = range_m[i] > far_m ? range_m[i] : far_m;
+    }
+    return near_m < far_m && beam_is_deep(s->detect->signal, near_m, far_m - near_m, far_m - near_m);
+}
+
+/* Returns the range at which a job's axis meets the plane that sub-ray i has hit. On a body that moves, where only the
+ * incidence is known, it is the range of the hit. */
+static double axis_range(const struct caster *c, const struct chunk *k, const struct job *job, uint32_t i)
+{
+    const struct pool *p = &c->sub_rays->pool;
+    const double dir[3] = VEC3_AT(p->d, i);
+    double from_m[3] = VEC3_AT(p->p, i), axis_m[3];
+    struct bvh_plane plane;
+    if (p->triangle[i] == BVH_NO_TRIANGLE) return p->range_m[i];
+    bvh_get_plane(k->s->bvh, p->triangle[i], &plane);
+    bvh_origin_of(&k->from, job->pulse, axis_m);
+    vec3_sub(from_m, axis_m, from_m);
+    return (p->range_m[i] * vec3_dot(plane.n, dir) + vec3_dot(plane.n, from_m)) / vec3_dot(plane.n, job->sight.dir);
+}
+
+/* Adds the hits of sub-ray i of a job. deep: distances count. */
+static void add_hits(struct caster *c, const struct chunk *k, const struct job *job, uint32_t i, int deep)
 {
     const struct cast_setup *s = k->s;
     const struct pool *p = &c->sub_rays->pool;
@@ -137,10 +168,11 @@ static void add_hits(struct caster *c, const struct chunk *k, const struct job *
     if (isnan(p->range_m[i])) return;
     if (k->texels) r.colour = p->colour[i];
     if (k->spreads) r.sigma_m = hit_sigma(c, s, job, i);
+    r.plane_m = deep ? axis_range(c, k, job, i) : r.range_m;
     add_return(c, s, &r, 1.0, p->rho[i]);
     if (s->detect == NULL || s->detect->depth == 0) return;
     for (uint32_t j = b->first[i]; j < b->first[i] + b->count[i]; j++) {
-        r.range_m = b->range_m[j];
+        r.range_m = r.plane_m = b->range_m[j];
         r.label = b->label[j];
         if (k->texels) r.colour = b->colour[j];
         if (k->spreads) r.sigma_m = beam_round_sigma(&s->beam->beam, r.range_m, b->cosine[j], (double)p->xx[i]);
@@ -161,10 +193,19 @@ static int sees_through(const struct caster *c, const struct cast_setup *s, cons
     return 0;
 }
 
+/* Sets how the returns of a footprint are merged. */
+static void set_merging(const struct cast_setup *s, uint32_t most, struct beam_merging *how)
+{
+    beam_merging(&s->beam->beam, most, how);
+    how->signal = caster_signal(s);
+    how->least_m = s->range_min_m;
+}
+
 /* Merges the returns of a job into echoes. */
 static void finish_job(struct caster *c, const struct chunk *k, const struct job *job)
 {
     struct sub_ray_work *w = c->sub_rays;
+    const int deep = is_deep(c, k->s, job);
     struct beam_merging how;
     if (sees_through(c, k->s, job)) {
         w->again[w->n_again++] = job->pulse;
@@ -174,9 +215,9 @@ static void finish_job(struct caster *c, const struct chunk *k, const struct job
     w->is_silenced = 0;
     if (job->centre.energy > 0.0) add_centre(c, k->s, job);
     for (uint32_t i = job->first; i < job->first + job->n; i++)
-        add_hits(c, k, job, i);
+        add_hits(c, k, job, i, deep);
     /* Detection chooses among the echoes later. For it, as many are kept here as a pulse can have. */
-    beam_merging(&k->s->beam->beam, k->s->detect != NULL ? LINE_MAX_ECHOES : caster_max_echoes(k->s), &how);
+    set_merging(k->s, k->s->detect != NULL ? LINE_MAX_ECHOES : caster_max_echoes(k->s), &how);
     uint32_t n = beam_merge(&how, w->returns, w->n_returns, &w->echo[w->n_echoes], &c->counters.crowded);
     c->counters.faint += w->is_silenced && n == 0;
     if (k->waves) waves_take_returns(c, k, job->pulse, w->returns, w->n_returns);
@@ -206,10 +247,11 @@ static void finish_alike(struct caster *c, const struct chunk *k, uint32_t first
                                      .energy = p->energy[at],
                                      .range_m = p->range_m + at,
                                      .label = p->label + at,
-                                     .rho = d != NULL && d->surfaces != NULL ? p->rho + at : NULL};
+                                     .rho = d != NULL && d->surfaces != NULL ? p->rho + at : NULL,
+                                     .plane = caster_has_bodies(k->s) ? NULL : p->triangle + at};
     struct beam_merging how;
     struct beam_echo echo[BEAM_ALIKE];
-    beam_merging(&k->s->beam->beam, 1, &how);
+    set_merging(k->s, 1, &how);
     const uint32_t merged = beam_merge_alike(&how, &alike, echo);
     for (uint32_t i = 0; i < BEAM_ALIKE; i++) {
         const struct job *job = &w->job[first + i];

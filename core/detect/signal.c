@@ -57,6 +57,9 @@ int detect_signal_set_up(const struct detect_signal_spec *spec, struct detect_si
     signal->jitter2 = (spec->sigma_m * spec->sigma_m - signal->floor2) * at_y * at_y;
     signal->per_distance = 1e-6 * spec->sigma_ppm;
     signal->extinction2_1_m = 2.0 * spec->extinction_1_m;
+    signal->steepest_1_m = fabs(signal->extinction2_1_m); /* the overlap rises by at most the square that R^2 takes */
+    for (uint32_t k = 0; k < signal->n; k++)
+        signal->steepest_1_m += fabs(signal->more_1_m[k]);
     signal->signal_key = rng_key(spec->seed, RNG_SIGNAL);
     signal->range_key = rng_key(spec->seed, RNG_RANGE);
     return SH_OK;

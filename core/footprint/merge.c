@@ -30,16 +30,63 @@ void beam_sort(struct beam_return *r, uint32_t n)
         }
 }
 
-/* Returns the weight of a return: the power that comes back from it. If no power comes back from any of the returns
- * (by_back 0), it is the energy of the return. */
-static double weight_of(const struct beam_return *r, int by_back)
+/* Returns the amplitude that light from range_m has at the head, for rho = 1. The head receives nothing from below
+ * least_m. */
+static double gain_at(const struct beam_merging *how, double range_m)
 {
-    return by_back ? r->back : r->energy;
+    return range_m < how->least_m ? 0.0 : detect_amplitude(how->signal, fmax(range_m, 1e-6), 1.0);
+}
+
+/* The mean moves by the covariance of the ranges and the gains: at most a quarter of the product of what they span
+ * (Cauchy and Schwarz; T. Popoviciu, 1935). The gains span up to spread_m times the steepest change of log A. */
+int beam_is_deep(const struct detect_signal *signal, double near_m, double depth_m, double spread_m)
+{
+    return signal != NULL &&
+           depth_m * spread_m * (2.0 + signal->steepest_1_m * near_m) > 4.0 * BEAM_LEAST_SHIFT_M * near_m;
+}
+
+/* Sets the gains of an echo's returns, the nearest of which is the first. Returns 0 where they may be left out, because
+ * they do not move the echo. */
+static int set_gains(const struct beam_merging *how, struct beam_return *r, uint32_t n)
+{
+    const double near_m = r[0].range_m;
+    double far_m = near_m, first_m = INFINITY, last_m = 0.0;
+    if (how->signal == NULL) return 0;
+    for (uint32_t i = 1; i < n; i++)
+        far_m = r[i].range_m > far_m ? r[i].range_m : far_m;
+    if (!beam_is_deep(how->signal, near_m, far_m - near_m, far_m - near_m)) return 0;
+    for (uint32_t i = 0; i < n; i++) {
+        r[i].plane_m = r[i].plane_m > near_m ? fmin(r[i].plane_m, far_m) : near_m; /* near_m for NaN, too */
+        first_m = fmin(first_m, r[i].plane_m);
+        last_m = fmax(last_m, r[i].plane_m);
+    }
+    /* A return that is not received has no weight, wherever its plane meets the axis. */
+    if (near_m >= how->least_m && !beam_is_deep(how->signal, near_m, far_m - near_m, last_m - first_m)) return 0;
+    for (uint32_t i = 0; i < n; i++)
+        r[i].gain = r[i].range_m < how->least_m ? 0.0 : gain_at(how, fmax(r[i].plane_m, how->least_m));
+    return 1;
+}
+
+/* The weight of a return: the power that is received from it (BY_POWER), or the power that comes back, where the gains
+ * do not matter (BY_BACK). Where there is no power from any of the returns, it is the energy of the return. */
+enum weighting { BY_ENERGY, BY_BACK, BY_POWER };
+
+static double weight_of(const struct beam_return *r, enum weighting by)
+{
+    return by == BY_BACK ? r->back : by == BY_POWER ? r->back * r->gain : r->energy;
+}
+
+static double sum_weights(const struct beam_return *r, uint32_t n, enum weighting by)
+{
+    double sum = 0.0;
+    for (uint32_t i = 0; i < n; i++)
+        sum += weight_of(&r[i], by);
+    return sum;
 }
 
 /* Finds the surface from which most power comes back, perhaps by many weak returns. Returns the index of its first
  * return. */
-static uint32_t of_strongest_surface(const struct beam_return *r, uint32_t n, int by_back)
+static uint32_t of_strongest_surface(const struct beam_return *r, uint32_t n, enum weighting by)
 {
     uint32_t best = 0;
     double most = -1.0;
@@ -50,7 +97,7 @@ static uint32_t of_strongest_surface(const struct beam_return *r, uint32_t n, in
             first++;
         if (first != i) continue;
         for (uint32_t k = i; k < n; k++)
-            if (r[k].label == r[i].label) sum += weight_of(&r[k], by_back);
+            if (r[k].label == r[i].label) sum += weight_of(&r[k], by);
         if (sum > most) {
             most = sum;
             best = i;
@@ -66,38 +113,51 @@ struct average {
     uint32_t strongest;
 };
 
-/* Averages returns, weighted by the power that comes back, or by energy; `all` is the sum of the
- * weights. */
+/* Averages returns; `all` is the sum of their weights. */
 static struct average average(const struct beam_merging *how, const struct beam_return *r, uint32_t n, double all,
-                              int by_back)
+                              enum weighting by)
 {
     struct average a = {.strongest = 0};
     double first = 0.0, second = 0.0;
     int alike = 1;
     for (uint32_t i = 0; i < n; i++) {
-        double d = r[i].range_m - r[0].range_m, weight = weight_of(&r[i], by_back);
+        double d = r[i].range_m - r[0].range_m, weight = weight_of(&r[i], by);
         first += weight * d;
         second += weight * (d * d + (double)r[i].sigma_m * (double)r[i].sigma_m);
-        if (weight > weight_of(&r[a.strongest], by_back)) a.strongest = i;
+        if (weight > weight_of(&r[a.strongest], by)) a.strongest = i;
         alike &= r[i].label == r[0].label;
     }
-    if (!alike && how->by_surface) a.strongest = of_strongest_surface(r, n, by_back);
+    if (!alike && how->by_surface) a.strongest = of_strongest_surface(r, n, by);
     a.mean = first / all;
     a.variance = fmax(0.0, second / all - a.mean * a.mean);
     return a;
 }
 
-/* Makes one echo from returns without a gap between them. Returns 0 where they are too weak for one. */
-static int make_echo(const struct beam_merging *how, const struct beam_return *r, uint32_t n, struct beam_echo *echo)
+/* Returns the power that would come back from one surface in the place of these returns, for the head to receive as
+ * much power as from all of them. */
+static double joint_back(const struct beam_merging *how, const struct beam_return *r, uint32_t n, double power)
 {
-    double energy = 0.0, back = 0.0;
-    struct average a = {.variance = (double)r[0].sigma_m * (double)r[0].sigma_m};
-    for (uint32_t i = 0; i < n; i++) {
-        energy += r[i].energy;
-        back += r[i].back;
-    }
+    double first = 0.0;
+    for (uint32_t i = 0; i < n; i++)
+        first += weight_of(&r[i], BY_POWER) * (r[i].plane_m - r[0].range_m);
+    return power / gain_at(how, fmax(r[0].range_m + first / power, how->least_m));
+}
+
+/* Makes one echo from returns without a gap between them, the nearest of which is the first. Returns 0 where they are
+ * too weak for one. */
+static int make_echo(const struct beam_merging *how, struct beam_return *r, uint32_t n, struct beam_echo *echo)
+{
+    const double energy = sum_weights(r, n, BY_ENERGY);
     if (energy < how->least_energy) return 0;
-    if (n > 1) a = average(how, r, n, back > 0.0 ? back : energy, back > 0.0);
+    enum weighting by = n > 1 && set_gains(how, r, n) ? BY_POWER : BY_BACK;
+    double all = sum_weights(r, n, by), back = by == BY_POWER && all > 0.0 ? joint_back(how, r, n, all) : all;
+    if (by == BY_POWER && !(all > 0.0)) all = back = sum_weights(r, n, by = BY_BACK);
+    if (!(all > 0.0)) {
+        by = BY_ENERGY;
+        all = energy;
+    }
+    struct average a = {.variance = (double)r[0].sigma_m * (double)r[0].sigma_m};
+    if (n > 1) a = average(how, r, n, all, by);
     *echo = (struct beam_echo){.range_m = r[0].range_m + a.mean,
                                .energy = energy,
                                .back = back,
@@ -109,11 +169,16 @@ static int make_echo(const struct beam_merging *how, const struct beam_return *r
 
 /* Drops the weakest echo. Echoes that differ by less than a float's resolution count as equal: the first
  * of them goes. */
-static void drop_weakest(struct beam_echo *e, uint32_t n)
+static void drop_weakest(const struct beam_merging *how, struct beam_echo *e, uint32_t n)
 {
     uint32_t weakest = 0;
-    for (uint32_t i = 0; i < n; i++)
-        if ((float)e[i].back < (float)e[weakest].back) weakest = i;
+    float least = INFINITY;
+    for (uint32_t i = 0; i < n; i++) {
+        const double gain = how->signal != NULL ? gain_at(how, e[i].range_m) : 1.0;
+        const float power = (float)(e[i].back * gain);
+        if (power < least) weakest = i;
+        least = fminf(power, least);
+    }
     memmove(e + weakest, e + weakest + 1, (n - weakest - 1) * sizeof *e);
 }
 
@@ -149,7 +214,7 @@ uint32_t beam_merge(const struct beam_merging *how, struct beam_return *r, uint3
         if (!make_echo(how, r + i, end - i, &echo[found])) continue;
         echo[found++].number = number++;
         if (found <= how->most) continue;
-        drop_weakest(echo, found--);
+        drop_weakest(how, echo, found--);
         ++*left_out;
     }
     return found;
@@ -243,11 +308,11 @@ static void sum_returns(const struct beam_alike *alike, const struct reaches *of
     *sums = s;
 }
 
-/* Returns a bit for each pulse whose returns have one label. */
+/* Returns a bit for each pulse whose n returns have one label or plane. */
 VEC_CLONES
-static uint32_t have_one_label(const struct beam_alike *alike)
+static uint32_t have_one(const uint32_t *label, uint32_t n)
 {
-    const uint32_t *label = alike->label, n = alike->n, all = BEAM_ALIKE * n;
+    const uint32_t all = BEAM_ALIKE * n;
     uint32_t differ = 0, bits = 0;
     for (uint32_t i = 0; i < all; i++)
         differ |= label[i] ^ label[0];
@@ -274,7 +339,7 @@ uint32_t beam_merge_alike(const struct beam_merging *how, const struct beam_alik
         sum_returns(alike, &r, &sums);
     else
         sum_ranges(alike, &r, &sums);
-    uint32_t done = have_one_label(alike);
+    uint32_t done = have_one(alike->label, alike->n), deep = 0;
     for (uint32_t i = 0; i < BEAM_ALIKE; i++) {
         const double back = alike->rho != NULL ? sums.back[i] : energy;
         if (!r.is_whole[i] || !(r.far_m[i] - r.near_m[i] <= how->gap_m) || !(back > 0.0)) done &= ~(1U << i);
@@ -282,6 +347,9 @@ uint32_t beam_merge_alike(const struct beam_merging *how, const struct beam_alik
                                      .energy = energy,
                                      .back = back,
                                      .label = alike->label[i * alike->n]};
+        const double depth_m = r.far_m[i] - r.near_m[i];
+        deep |= (uint32_t)beam_is_deep(how->signal, r.near_m[i], depth_m, depth_m) << i;
     }
-    return done;
+    if ((done & deep) == 0) return done;
+    return alike->plane != NULL ? done & (~deep | have_one(alike->plane, alike->n)) : done & ~deep;
 }

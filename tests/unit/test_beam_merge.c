@@ -249,6 +249,73 @@ static void test_crowd(void **state)
     }
 }
 
+/* ---- power that is received */
+
+/* The signal falls with the square of the range. Of too many echoes, that of the least received power is left out: the
+ * far ones send more back here, and 0.1 / 10^2 is the most. The surface of a mixed echo is that of the most power: 0.4
+ * at 1 m against 0.6 at 1.5 m. Its power is the sum of both. */
+static void test_received_power(void **state)
+{
+    (void)state;
+    struct detect_signal signal;
+    struct sh_err err;
+    const struct detect_signal_spec spec = {.n_reaches = 1, .reach = {{0.9, 500.0}}, .threshold_snr = 8.0, .sharp = 1};
+    struct beam_merging few = how;
+    struct beam_return r[4], two[2] = {{.range_m = 1.0, .plane_m = 1.0, .energy = 0.4, .back = 0.4, .label = 1},
+                                       {.range_m = 1.5, .plane_m = 1.5, .energy = 0.6, .back = 0.6, .label = 2}};
+    const double power = 0.4 + 0.6 / 2.25, mean_m = (0.4 + 0.6 / 1.5) / power;
+    uint64_t left_out = 0;
+    assert_int_equal(detect_signal_set_up(&spec, &signal, &err), SH_OK);
+    few.signal = &signal;
+    for (few.most = 1; few.most <= 3; few.most++) {
+        for (uint32_t i = 0; i < 4; i++)
+            r[i] = (struct beam_return){.range_m = 10.0 * (i + 1),
+                                        .plane_m = 10.0 * (i + 1),
+                                        .energy = 0.2,
+                                        .back = i == 0 ? 0.1 : 0.1 + 0.1333 * i};
+        assert_int_equal(beam_merge(&few, r, 4, echo, &left_out), few.most);
+        for (uint32_t i = 0; i < few.most; i++)
+            assert_true(echo[i].range_m == 10.0 * (i + 1));
+    }
+    assert_int_equal(left_out, 6);
+    assert_int_equal(beam_merge(&few, two, 2, echo, &left_out), 1);
+    assert_int_equal(echo[0].label, 1);
+    assert_true(fabs(echo[0].range_m - mean_m) < 1e-12 && fabs(echo[0].back / (power * mean_m * mean_m) - 1.0) < 1e-9);
+    two[1].plane_m = 1.0; /* both on one plane: distance has no part */
+    assert_int_equal(beam_merge(&few, two, 2, echo, &left_out), 1);
+    assert_true(echo[0].label == 2 && fabs(echo[0].range_m - 1.3) < 1e-12 && echo[0].back == 1.0);
+    few.least_m = 1.2; /* nothing is received from the first */
+    assert_int_equal(beam_merge(&few, two, 2, echo, &left_out), 1);
+    assert_true(fabs(echo[0].range_m - 1.5) < 1e-12 && fabs(echo[0].back / 0.6 - 1.0) < 1e-9);
+}
+
+/* Near pulses are merged several at a time only where their returns lie on one plane. */
+static void test_alike_planes(void **state)
+{
+    (void)state;
+    enum { N = 7 };
+    static double range_m[BEAM_ALIKE * N];
+    static uint32_t label[BEAM_ALIKE * N], plane[BEAM_ALIKE * N];
+    const struct detect_signal_spec spec = {.n_reaches = 1, .reach = {{0.9, 500.0}}, .threshold_snr = 8.0, .sharp = 1};
+    struct detect_signal signal;
+    struct beam_echo alike[BEAM_ALIKE];
+    struct beam_merging with = how;
+    struct sh_err err;
+    assert_int_equal(detect_signal_set_up(&spec, &signal, &err), SH_OK);
+    with.signal = &signal;
+    for (uint32_t i = 0; i < BEAM_ALIKE * N; i++) {
+        range_m[i] = (i / N % 3 == 0 ? 100.0 : 1.0) + 0.02 * (i % N); /* at 100 m the shift is below 0.1 mm */
+        plane[i] = i / N % 3 == 1 ? i % N : 3;
+    }
+    const struct beam_alike all = {N, 1.0 / N, range_m, label, NULL, plane};
+    const struct beam_alike unknown = {N, 1.0 / N, range_m, label, NULL, NULL};
+    const uint32_t bits = beam_merge_alike(&with, &all, alike), far = beam_merge_alike(&with, &unknown, alike);
+    for (uint32_t i = 0; i < BEAM_ALIKE; i++) {
+        assert_int_equal(bits >> i & 1, i % 3 != 1);
+        assert_int_equal(far >> i & 1, i % 3 == 0);
+    }
+}
+
 /* ---- several pulses at a time */
 
 enum { EACH = 19, ROWS = 400 };
@@ -303,7 +370,7 @@ static void test_alike(void **state)
         struct beam_echo alike[BEAM_ALIKE], one;
         for (uint32_t i = 0; i < BEAM_ALIKE; i++)
             make_row((uint64_t)row * BEAM_ALIKE + i, range_m + i * EACH, rho + i * EACH, label + i * EACH);
-        const struct beam_alike all = {EACH, 1.0 / EACH, range_m, label, weights};
+        const struct beam_alike all = {EACH, 1.0 / EACH, range_m, label, weights, NULL};
         const uint32_t bits = beam_merge_alike(&how, &all, alike);
         for (uint32_t i = 0; i < BEAM_ALIKE; i++) {
             const double *r = range_m + i * EACH, *w = weights != NULL ? rho + i * EACH : NULL;
@@ -341,7 +408,9 @@ int main(void)
         cmocka_unit_test(test_definitions),
         cmocka_unit_test(test_axes),
         cmocka_unit_test(test_rings),
+        cmocka_unit_test(test_received_power),
         cmocka_unit_test(test_alike),
+        cmocka_unit_test(test_alike_planes),
     };
     return cmocka_run_group_tests(tests, set_up, NULL);
 }
