@@ -304,11 +304,11 @@ static void assimp_gets_bodies_alone(void)
     scene_free(scene);
     /* Members of an analysis model share a wall's shape, and a product has only a clearance. */
     ifc_write_text(
-        text, "IFC4", NULL, NULL, ifc_shapes, 1,
+        text, "IFC2X3", NULL, NULL, ifc_shapes, 1,
         "#7000=IFCSTRUCTURALSURFACEMEMBER('guid_of_plate_00000000',#5,'plate',$,$,#1003,#1002,.SHELL.,0.2);\n"
         "#7001=IFCSHAPEREPRESENTATION(#13,'Clearance','SolidModel',(#1060));\n"
         "#7002=IFCPRODUCTDEFINITIONSHAPE($,$,(#7001));\n"
-        "#7003=IFCWALL('guid_of_space_00000000',#5,'space',$,$,#1003,#7002,$,$);\n"
+        "#7003=IFCWALL('guid_of_space_00000000',#5,'space',$,$,#1003,#7002,$);\n"
         "#7005=IFCRELCONTAINEDINSPATIALSTRUCTURE('guid_of_relation_00009',#5,$,$,(#7000,#7003),#20);\n");
     must_read(1e-3);
     if (!(fabs(total_area(scene) - 28) < 1e-4)) fail_msg("%g m2", total_area(scene));
