@@ -173,13 +173,11 @@ static const char *copies_text(const struct scene *scene, char *text, size_t len
     return text;
 }
 
-static int print_summary(const struct config *cfg, const struct sites *sites, double all_mb, FILE *out,
-                         struct sh_err *err)
+static void print_summary(const struct config *cfg, const struct sites *sites, double all_mb, FILE *out)
 {
     const struct site *site = sites->first;
     const struct scene *scene = site->scene;
     char copies[96];
-    int rc = SH_OK;
     fprintf(out, "%s: ok\n", cfg->file);
     print_scanners(sites, out);
     fprintf(out, "scene     %u triangles, %u surfaces, %sx %.3f..%.3f  y %.3f..%.3f  z %.3f..%.3f m\n", scene->n_all,
@@ -189,13 +187,12 @@ static int print_summary(const struct config *cfg, const struct sites *sites, do
     print_target(site, out);
     check_print_anchor(site, out);
     if (site->stop != NULL) check_print_stops(site, out);
-    for (uint32_t i = 0; i < site->n_stations && rc == SH_OK && site->stop == NULL; i++)
-        rc = check_print_station(sites_of(sites, i), i, out, err);
+    for (uint32_t i = 0; i < site->n_stations && site->stop == NULL; i++)
+        check_print_station(sites_of(sites, i), i, out);
     print_platform(site, out);
     print_output(cfg, site, out);
     print_waves(site, out);
     print_links(cfg, out);
-    return rc;
 }
 
 static int print_time(const struct config *cfg, FILE *out, struct sh_err *err)
@@ -240,7 +237,7 @@ static int check(struct config *cfg, void *ctx, struct sh_err *err)
     if (rc == SH_OK) rc = check_head(cfg, sites.first, &report, err);
     if (rc == SH_OK && cfg->head.settings_file[0] != '\0')
         rc = settings_file_check(cfg->head.settings_file, cfg->profile.name, err);
-    if (rc == SH_OK) rc = print_summary(cfg, &sites, all_mb, out, err);
+    if (rc == SH_OK) print_summary(cfg, &sites, all_mb, out);
     if (rc == SH_OK && (run->scene || run->csv != NULL))
         rc = check_print_scene(sites.first, run->n_warnings, run->csv, run->scene ? out : NULL, err);
     if (rc == SH_OK) rc = print_time(cfg, out, err);
