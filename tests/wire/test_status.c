@@ -74,6 +74,10 @@ static const struct {
     {"map @config.yaml -o @x.png --set scene.meshes[0].file=none.obj", WRONG},
     {"check @config.yaml --set links[0].address=300.1.1.1", WRONG},
     {"run @config.yaml --set links[0].address=300.1.1.1", WRONG},
+    {"check @config.yaml --set head.settings_file=@none/x", WRONG},
+    {"run @config.yaml --set head.settings_file=@none/x", WRONG},
+    {"check @config.yaml --set head.settings_file=@stored", WRONG},
+    {"run @config.yaml --set head.settings_file=@stored", WRONG},
 
     /* input files: missing, or of another kind */
     {"init @none.obj", WRONG},
@@ -127,6 +131,8 @@ static void write_files(const struct wire *wire)
                                                   .frames = 1,
                                                   .links = LINK_YAML_TCP});
     wire_write_text(wire, "faulty.yaml", "head: {profile: full-sweep, frames: -1}\n");
+    /* HEAD:FOO is no command of the head */
+    wire_write_text(wire, "stored", "scanhead settings 1\nprofile full-sweep\nhead HEAD:FOO 1\nend\n");
     assert_int_equal(mkfifo(wire_path(wire, "fifo.yaml"), 0600), 0);
     assert_int_equal(mkfifo(wire_path(wire, "fifo.shs"), 0600), 0);
     assert_int_equal(mkfifo(wire_path(wire, "fifo.obj"), 0600), 0);
