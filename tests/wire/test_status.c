@@ -90,6 +90,29 @@ static const struct {
     {"view @faulty.yaml", WRONG},
     {"record @none.shs -o @x.ply", WRONG},
     {"record @fifo.shs -o @x.ply", WRONG},
+    {"run @none.shs --link null", WRONG},
+    {"run @none.pcap", WRONG},
+    {"run @empty.shs --start --link null", WRONG},
+    {"run @junk.shs --start --link null", WRONG},
+    {"run @empty.pcap", WRONG},
+    {"run @junk.pcap", WRONG},
+    {"run @empty.pcapng", WRONG},
+    {"run @junk.pcapng", WRONG},
+    {"record @empty.shs -o @x.ply", WRONG},
+    {"record @junk.shs -o @x.ply", WRONG},
+    {"record @junk.pcapng -o @x.ply", WRONG},
+    {"record --repair @empty.shs", WRONG},
+    {"record --repair @junk.shs", WRONG},
+    {"record --repair @junk.pcapng", WRONG},
+    {"record --repair @junk.ply", WRONG},
+    {"record --repair @none.shs", WRONG},
+    {"view @empty.shs", WRONG},
+    {"view @junk.shs", WRONG},
+    {"view @junk.pcapng", WRONG},
+    {"view @junk.ply", WRONG},
+    {"report @config.yaml @junk.ply", WRONG},
+    {"report @config.yaml @junk.las", WRONG},
+    {"map @config.yaml -o @x.png --cloud @junk.ply", WRONG},
     {"run @config.yaml --replay-journal @none", WRONG},
     {"run @config.yaml --replay-journal @scan.shs", WRONG},
     {"run @config.yaml --set platform.kind=trajectory --set platform.file=@none.csv", WRONG},
@@ -112,6 +135,9 @@ static const struct {
     {"report @config.yaml @scan.ply --tolerance-m 1e-12", FAILED},
 };
 
+static const char *const BROKEN[] = {"empty.shs", "empty.pcap",  "empty.pcapng", "junk.shs",
+                                     "junk.pcap", "junk.pcapng", "junk.ply",     "junk.las"};
+
 /* Writes the first half of a recorded stream. */
 static void cut_stream(const struct wire *wire)
 {
@@ -131,6 +157,8 @@ static void write_files(const struct wire *wire)
                                                   .frames = 1,
                                                   .links = LINK_YAML_TCP});
     wire_write_text(wire, "faulty.yaml", "head: {profile: full-sweep, frames: -1}\n");
+    for (size_t i = 0; i < sizeof BROKEN / sizeof BROKEN[0]; i++)
+        wire_write_text(wire, BROKEN[i], strncmp(BROKEN[i], "empty", 5) == 0 ? "" : "neither stream nor cloud\n");
     /* HEAD:FOO is no command of the head */
     wire_write_text(wire, "stored", "scanhead settings 1\nprofile full-sweep\nhead HEAD:FOO 1\nend\n");
     assert_int_equal(mkfifo(wire_path(wire, "fifo.yaml"), 0600), 0);
