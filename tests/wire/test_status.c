@@ -32,6 +32,8 @@ static const struct {
     /* the command line */
     {"", WRONG},
     {"fly", WRONG},
+    {"--version", DONE},
+    {"--version extra", WRONG},
     {"run @config.yaml --fly", WRONG},
     {"record @config.yaml -o @x.ply --fly", WRONG},
     {"plan @config.yaml --fly", WRONG},
@@ -92,6 +94,7 @@ static const struct {
     {"record @fifo.shs -o @x.ply", WRONG},
     {"run @none.shs --link null", WRONG},
     {"run @none.pcap", WRONG},
+    {"run @scan.shs --link null", WRONG}, /* nobody could begin it */
     {"run @empty.shs --start --link null", WRONG},
     {"run @junk.shs --start --link null", WRONG},
     {"run @empty.pcap", WRONG},
