@@ -92,10 +92,8 @@ static void without_profiles_the_rest_is_there(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(heads_are_listed_in_their_order),
-        cmocka_unit_test(a_bus_may_have_no_head),
-        cmocka_unit_test(without_usb_the_reason_is_there),
-        cmocka_unit_test(the_rest_of_the_list),
+        cmocka_unit_test(heads_are_listed_in_their_order),    cmocka_unit_test(a_bus_may_have_no_head),
+        cmocka_unit_test(without_usb_the_reason_is_there),    cmocka_unit_test(the_rest_of_the_list),
         cmocka_unit_test(without_profiles_the_rest_is_there),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
