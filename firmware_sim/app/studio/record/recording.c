@@ -217,19 +217,11 @@ static int is_long_enough(const struct recording *r, const struct scanhead_frame
     return (double)native_since_ns(frame->t_ns, r->scan_t0_ns) >= 1e9 * r->o->duration_s;
 }
 
-/* text: of the stream, with the name of its source. */
-static int fail_stream(const struct recording *r, int code, const char *text, struct sh_err *err)
-{
-    sh_fail(err, code, "%s", text);
-    return r->o->file != NULL ? sh_of_file(code, err) : code;
-}
-
 static int fail_end(const struct recording *r, int code, const char *how, struct sh_err *err)
 {
-    char text[512];
-    const int is_file = r->o->file != NULL;
-    snprintf(text, sizeof text, "%s%sthe stream ended %s", is_file ? r->o->file : "", is_file ? ": " : "", how);
-    return fail_stream(r, code, text, err);
+    const char *file = r->o->file;
+    if (file == NULL) return sh_fail(err, code, "the stream ended %s", how);
+    return sh_of_file(sh_fail(err, code, "%s: the stream ended %s", file, how), err);
 }
 
 /* Takes one frame. Returns 1: got one; 0: none in time; negative: the recording is over. */
@@ -242,7 +234,8 @@ static int step(struct recording *r, int timeout_ms, struct sh_err *err)
     if (reported != SH_OK) return reported;
     if (rc == SCANHEAD_ETIMEOUT) return 0;
     if (is_gone(r, rc) && !r->is_done) return replug(r, rc, err);
-    if (rc != SCANHEAD_OK) return fail_stream(r, rc, scanhead_error(r->sh), err);
+    if (rc != SCANHEAD_OK) sh_fail(err, rc, "%s", scanhead_error(r->sh));
+    if (rc != SCANHEAD_OK) return r->o->file != NULL ? sh_of_file(rc, err) : rc;
     look_at(r, &frame);
     if (frame.type == SCANHEAD_POINTS) {
         r->heard_ns = r->pulses_ns = r->now_ns;
