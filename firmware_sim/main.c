@@ -63,6 +63,10 @@ static int main_run(int argc, char **argv)
     const char *word = strcmp(argv[1], "help") == 0 && argc > 2 ? argv[2] : argv[1];
     if (is_elsewhere(word)) return fail_elsewhere(word);
     if (strcmp(argv[1], "help") == 0) return help_run(COMMANDS, argc - 1, argv + 1);
+    if (strcmp(argv[1], "--version") == 0 && argc > 2) {
+        app_say("--version: %s is too many; allowed is --version alone", argv[2]);
+        return APP_USAGE;
+    }
     if (strcmp(argv[1], "--version") == 0) {
         printf("%s %s\n", app_program, scanhead_version());
         return APP_OK;

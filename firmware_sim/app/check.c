@@ -16,23 +16,29 @@
 #include "firmware_sim/loop/loop.h"
 #include "firmware_sim/site/waves.h"
 
-/* Makes the head with its links as `run` does, starts nothing, and closes all. So what `run` would refuse shows now: a
- * taken port, two links at one port, a link that can't carry the stream. cfg: that of the site. */
+/* Makes the head with its links and its stored settings as `run` does, starts nothing, and closes all. So what `run`
+ * would refuse shows now: a taken port, two links at one port, a link that can't carry the stream. cfg: that of the
+ * site. */
 static int check_head(struct config *cfg, const struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     struct link_spec kept[CONFIG_MAX_LINKS];
     const uint32_t threads = cfg->loop.threads;
+    struct device_options options = {.report = report};
     struct device *device = NULL;
     struct loop *loop = NULL;
+    int rc = SH_OK;
     memcpy(kept, cfg->link, sizeof kept);
     cfg->loop.threads = 1; /* each has memory of its own */
     for (uint32_t i = 0; i < cfg->n_links; i++)
         if (cfg->link[i].type == LINK_FILE)
             cfg->link[i] = (struct link_spec){.type = LINK_NULL}; /* opening a file would empty it */
-    int rc = device_create(site, &(struct device_options){.report = report}, &device, err);
+    if (cfg->head.settings_file[0] != '\0')
+        rc = settings_file_look(cfg->head.settings_file, cfg->profile.name, &options.settings, err);
+    if (rc == SH_OK) rc = device_create(site, &options, &device, err);
     if (rc == SH_OK) rc = loop_create(site, device, &(struct loop_options){.report = report}, &loop, err);
     loop_free(loop);
     device_free(device);
+    settings_file_close(options.settings, NULL);
     memcpy(cfg->link, kept, sizeof kept);
     cfg->loop.threads = threads;
     return rc;
@@ -173,13 +179,11 @@ static const char *copies_text(const struct scene *scene, char *text, size_t len
     return text;
 }
 
-static int print_summary(const struct config *cfg, const struct sites *sites, double all_mb, FILE *out,
-                         struct sh_err *err)
+static void print_summary(const struct config *cfg, const struct sites *sites, double all_mb, FILE *out)
 {
     const struct site *site = sites->first;
     const struct scene *scene = site->scene;
     char copies[96];
-    int rc = SH_OK;
     fprintf(out, "%s: ok\n", cfg->file);
     print_scanners(sites, out);
     fprintf(out, "scene     %u triangles, %u surfaces, %sx %.3f..%.3f  y %.3f..%.3f  z %.3f..%.3f m\n", scene->n_all,
@@ -189,13 +193,12 @@ static int print_summary(const struct config *cfg, const struct sites *sites, do
     print_target(site, out);
     check_print_anchor(site, out);
     if (site->stop != NULL) check_print_stops(site, out);
-    for (uint32_t i = 0; i < site->n_stations && rc == SH_OK && site->stop == NULL; i++)
-        rc = check_print_station(sites_of(sites, i), i, out, err);
+    for (uint32_t i = 0; i < site->n_stations && site->stop == NULL; i++)
+        check_print_station(sites_of(sites, i), i, out);
     print_platform(site, out);
     print_output(cfg, site, out);
     print_waves(site, out);
     print_links(cfg, out);
-    return rc;
 }
 
 static int print_time(const struct config *cfg, FILE *out, struct sh_err *err)
@@ -238,9 +241,7 @@ static int check(struct config *cfg, void *ctx, struct sh_err *err)
     int rc = sites_load(cfg, SITE_FOR_SCANS, &report, &sites, err);
     const double all_mb = peak_mb(); /* of the scene, without the head's queues */
     if (rc == SH_OK) rc = check_head(cfg, sites.first, &report, err);
-    if (rc == SH_OK && cfg->head.settings_file[0] != '\0')
-        rc = settings_file_check(cfg->head.settings_file, cfg->profile.name, err);
-    if (rc == SH_OK) rc = print_summary(cfg, &sites, all_mb, out, err);
+    if (rc == SH_OK) print_summary(cfg, &sites, all_mb, out);
     if (rc == SH_OK && (run->scene || run->csv != NULL))
         rc = check_print_scene(sites.first, run->n_warnings, run->csv, run->scene ? out : NULL, err);
     if (rc == SH_OK) rc = print_time(cfg, out, err);
@@ -295,7 +296,8 @@ const struct app_command app_check = {
     .notes =
         "Prints the scanners, the memory that the scene takes, and the places of the scene and of each station in\n"
         "every known coordinate frame. Opens and closes the links except files, all at once, so a taken port, a wrong\n"
-        "path or a link that can't carry the stream shows. For files it checks that their folder exists.\n"
+        "path or a link that can't carry the stream shows. It makes no file, but checks whether files of links and\n"
+        "head.settings_file can be written, and reads the stored settings.\n"
         "If the configuration is wrong, it shows all errors, up to 20, each with its line.\n"
         "\n"
         "--scene: an edge is open where an odd number of triangles of the object has it: one, or three where a face\n"

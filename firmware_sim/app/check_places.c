@@ -49,16 +49,16 @@ void check_print_anchor(const struct site *site, FILE *out)
         fprintf(out, "the scene's coordinates are UTM %d %s\n", f->zone, f->north ? "north" : "south");
 }
 
-/* Unit vector of the head's axis k in east, north, up at the station. */
-static int axis_enu(const struct site *site, uint32_t i, int k, double enu[3], struct sh_err *err)
+/* Unit vector of the head's axis k in east, north, up at the station. Returns 0 where it is not known. */
+static int axis_enu(const struct site *site, uint32_t i, int k, double enu[3])
 {
     const struct placement *at = &site->station[i].at;
     const double axis[3] = {at->rotation[k], at->rotation[3 + k], at->rotation[6 + k]};
     double to_enu[9];
     memcpy(to_enu, mat3_unit, sizeof to_enu);
-    int rc = site->anchor.known ? geoframe_to_enu(&site->anchor.frame, at->position_m, to_enu, err) : SH_OK;
-    if (rc == SH_OK) mat3_apply(to_enu, axis, enu);
-    return rc;
+    if (site->anchor.known && geoframe_to_enu(&site->anchor.frame, at->position_m, to_enu, NULL) != SH_OK) return 0;
+    mat3_apply(to_enu, axis, enu);
+    return 1;
 }
 
 static void print_utm(const struct locate_grid *utm, double height_m, FILE *out)
@@ -89,35 +89,53 @@ static void print_grid_ranges(const struct site *site, const double p_prcs[3], F
             range_m * error, 1e6 * error);
 }
 
-static int print_on_earth(const struct site *site, uint32_t i, FILE *out, struct sh_err *err)
+/* Finds the station in the grid of the output, with northings from the side of the equator that all points have. */
+static int find_in_grid(const struct site *site, const struct placement *at, struct locate_grid *utm,
+                        struct sh_err *why)
 {
-    const struct placement *at = &site->station[i].at;
-    const struct geoframe *frame = &site->anchor.frame;
-    double p_ecef[3], forward[3], up[3];
-    struct locate_grid utm;
-    int grid = site->anchor.known && frame->kind == GEOFRAME_GRID;
     int zone, side;
     site_grid(site, &zone, &side);
-    int rc = locate_in_grid(&at->place, zone, &utm, err);
-    if (rc == SH_OK && side != 0 && utm.zone != 0 && utm.north != (side > 0)) {
-        utm.north = side > 0;
-        utm.northing_m += utm.north ? -1e7 : 1e7;
+    const int rc = locate_in_grid(&at->place, zone, utm, why);
+    if (rc == SH_OK && side != 0 && utm->zone != 0 && utm->north != (side > 0)) {
+        utm->north = side > 0;
+        utm->northing_m += utm->north ? -1e7 : 1e7;
     }
-    if (rc == SH_OK) rc = axis_enu(site, i, 1, forward, err);
-    if (rc == SH_OK) rc = axis_enu(site, i, 2, up, err);
-    if (rc != SH_OK) return rc;
+    return rc;
+}
+
+/* utm: NULL where the grid doesn't reach the station. */
+static void print_axes(const struct site *site, uint32_t i, const struct locate_grid *utm, FILE *out)
+{
+    double forward[3], up[3];
+    if (!axis_enu(site, i, 1, forward) || !axis_enu(site, i, 2, up)) {
+        fputs("  y axis    its azimuth is not known\n", out); /* the scene's grid doesn't reach the station */
+        return;
+    }
+    const double azimuth_deg = angle_deg(atan2(forward[0], forward[1]));
+    fprintf(out, "  y axis    azimuth %.6f deg from true north", turn_deg(azimuth_deg));
+    if (utm != NULL) fprintf(out, ", %.6f from grid north", turn_deg(azimuth_deg - utm->convergence_deg));
+    fprintf(out, "; z axis %.6f deg off the plumb line\n", angle_deg(atan2(hypot(up[0], up[1]), up[2])));
+}
+
+/* A run needs none of these figures, so one that can't be given is no error: its line says why. */
+static void print_on_earth(const struct site *site, uint32_t i, FILE *out)
+{
+    const struct placement *at = &site->station[i].at;
+    const int is_grid = site->anchor.known && site->anchor.frame.kind == GEOFRAME_GRID;
+    double p_ecef[3];
+    struct locate_grid utm;
+    struct sh_err why;
+    const int is_in_grid = find_in_grid(site, at, &utm, &why) == SH_OK;
     georef_geodetic_to_ecef(&at->place, p_ecef);
     fprintf(out, "  geodetic  lat %.9f lon %.9f deg, height %.4f m\n", at->place.lat_deg, at->place.lon_deg,
             at->place.height_m);
-    print_utm(&utm, at->place.height_m, out);
-    if (grid) print_grid_ranges(site, at->position_m, out);
+    if (is_in_grid)
+        print_utm(&utm, at->place.height_m, out);
+    else
+        fprintf(out, "  utm       none: %s\n", why.text);
+    if (is_in_grid && is_grid) print_grid_ranges(site, at->position_m, out);
     fprintf(out, "  ecef      %.4f %.4f %.4f m\n", p_ecef[0], p_ecef[1], p_ecef[2]);
-    double azimuth_deg = angle_deg(atan2(forward[0], forward[1])),
-           off_plumb_deg = angle_deg(atan2(hypot(up[0], up[1]), up[2]));
-    fprintf(out,
-            "  y axis    azimuth %.6f deg from true north, %.6f from grid north; z axis %.6f deg off the plumb line\n",
-            turn_deg(azimuth_deg), turn_deg(azimuth_deg - utm.convergence_deg), off_plumb_deg);
-    return rc;
+    print_axes(site, i, is_in_grid ? &utm : NULL, out);
 }
 
 static void print_tripod(const struct site_station *s, const char *before, FILE *out)
@@ -128,7 +146,7 @@ static void print_tripod(const struct site_station *s, const char *before, FILE 
     fprintf(out, "%s%s", before, text);
 }
 
-int check_print_station(const struct site *site, uint32_t i, FILE *out, struct sh_err *err)
+void check_print_station(const struct site *site, uint32_t i, FILE *out)
 {
     const struct site_station *s = &site->station[i];
     const struct config_station *c = s->station;
@@ -141,7 +159,7 @@ int check_print_station(const struct site *site, uint32_t i, FILE *out, struct s
     if (!isnan(s->at.floor_m)) fprintf(out, "; %g m above the floor", s->at.floor_m);
     print_tripod(s, "\n  tripod    ", out);
     fputc('\n', out);
-    return s->at.on_earth ? print_on_earth(site, i, out, err) : SH_OK;
+    if (s->at.on_earth) print_on_earth(site, i, out);
 }
 
 void check_print_stops(const struct site *site, FILE *out)

@@ -9,7 +9,7 @@
 #include "firmware_sim/site/site.h"
 
 void check_print_anchor(const struct site *site, FILE *out);
-int check_print_station(const struct site *site, uint32_t i, FILE *out, struct sh_err *err);
+void check_print_station(const struct site *site, uint32_t i, FILE *out);
 /* A line with the times of all stops, then one line for each stop. */
 void check_print_stops(const struct site *site, FILE *out);
 

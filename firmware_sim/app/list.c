@@ -39,7 +39,8 @@ static int list_run(int argc, char **argv)
     char scenarios[512];
     int status = app_parse(&app_list, argc, argv, &in, NULL);
     if (status != APP_GO_ON) return status;
-    if (config_list_profiles(NULL, stdout, &err) < 0) return app_fail(&err);
+    /* All else is known without profiles. */
+    status = config_list_profiles(NULL, stdout, &err) < 0 ? app_fail(&err) : APP_OK;
     puts("links: pty (virtual serial port), tcp, udp, usb (usbip, usbredir, functionfs), web (page), file, null");
     printf("protocols:");
     for (int id = 0; id < PROTOCOL_N; id++)
@@ -48,7 +49,7 @@ static int list_run(int argc, char **argv)
     config_name_scenarios(scenarios, sizeof scenarios);
     printf("scenarios: %s\n", scenarios);
     list_usb();
-    return APP_OK;
+    return status;
 }
 
 static const struct app_option OPTIONS[] = {OPTION_END};
@@ -58,7 +59,8 @@ const struct app_command app_list = {
     .summary = "head profiles, kinds of links, scenarios, and the heads that USB shows",
     .options = OPTIONS,
     .notes =
-        "Profiles are searched in the folder $SCANHEAD_HEADS, else in the installed one, else in config/heads.\n"
+        "Profiles are searched in the folder $SCANHEAD_HEADS, else in ../share/scanhead/heads or ../config/heads from\n"
+        "the program's folder, else in config/heads from the working directory.\n"
         "\n"
         "For each profile it prints how its pulses are arranged, the width of its beam and how its maker defines it,\n"
         "noise and accuracy of its ranges, the protocols that support it, and its pulse rates. With each rate it "

@@ -23,7 +23,7 @@ struct named {
     int is_there, is_written;
     struct stat st;  /* where it is there */
     int needs_place; /* its folder must be there already */
-    int is_given;    /* by an option that writes it */
+    int is_given;    /* by an option that writes it, or by a file link */
     int is_filled;   /* likewise, and in place */
     int is_image;    /* of a mesh, beside it: meshes of one scan share their image */
     size_t n_ending; /* where each scan gets a file of its own: bytes of the path's ending; 0: it is one file */
@@ -32,6 +32,7 @@ struct named {
 struct files {
     struct named *file;
     size_t n, room;
+    const struct config *cfg;
     const char *prefix; /* before the names of keys */
     int keeps_written;  /* 1: files that the configuration names for writing are written */
     struct sh_err *err;
@@ -125,10 +126,14 @@ static int add_key(void *ctx, const char *key, const char *path, int is_written)
     struct files *f = ctx;
     if (is_written && !f->keeps_written) return SH_OK;
     const int rc = outputs_add(f, join(key[0] != '-' ? f->prefix : "", INT_MAX, key, ""), strdup(path), is_written, 0);
+    if (rc != SH_OK) return rc;
     /* Only files of links are written in every run. head.settings_file, for one, is not written where a journal is
      * replayed. */
-    if (rc == SH_OK) f->file[f->n - 1].needs_place = is_written && strncmp(key, "links", 5) == 0;
-    return rc;
+    unsigned link;
+    struct named *file = &f->file[f->n - 1];
+    file->needs_place = is_written && sscanf(key, "links[%u]", &link) == 1;
+    file->is_given = file->is_filled = file->needs_place && f->cfg->link[link].type == LINK_FILE;
+    return SH_OK;
 }
 
 static int add_of_mesh(void *ctx, const char *name, const char *path)
@@ -188,6 +193,7 @@ static int any_is_there(const struct files *f)
 static int add_all(struct files *f, const struct app_input *in, const struct config *cfg)
 {
     int rc = SH_OK;
+    f->cfg = cfg;
     f->keeps_written = in->opens_links;
     f->prefix = "";
     for (int i = 0; i < in->n_files && rc == SH_OK; i++)

@@ -48,7 +48,8 @@ static const struct cfg_key config_keys[] = {
     {"head", .type = CFG_MAP, .help = "The head and its settings at power-up."},
     {"head.profile", IN_CONFIG(profile_file), CFG_TEXT, .example = "riegl-vz400i",
      .allowed = "the name of a profile, or a path that ends in .yaml",
-     .help = "Head profile, from $SCANHEAD_HEADS, heads/ beside this file, the installed or the source directory."},
+     .help = "Head profile, from $SCANHEAD_HEADS, heads/ beside this file, ../share/scanhead/heads or ../config/heads "
+             "from the program's folder, or config/heads from the working directory."},
     {KEY(head.serial), CFG_TEXT, .def = "SIM-0001", .flags = CFG_ASCII, .help = "Serial number, as in *IDN?."},
     {"head.prr_hz", SETTING(prr_uhz), CFG_MICRO, "Hz", "@prr_max_hz", WITHIN("prr_min_hz", "prr_max_hz"),
      .help = "Pulse repetition rate. It counts every firing, also those in the blind part of a sweep. It follows from "

@@ -2,6 +2,8 @@
 #include "firmware_sim/device/settings_file.h"
 
 #include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
 #include <pthread.h>
 #include <stdarg.h>
 #include <stdint.h>
@@ -9,9 +11,9 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
-#include "core/infile.h"
 #include "core/newfile.h"
 #include "drivers/protocol/protocol.h"
 
@@ -32,7 +34,8 @@ struct image {
 struct settings_file {
     const char *path;
     const struct sh_report *report;
-    int fd; /* of the file at path; locked */
+    int fd;         /* of the file at path; locked. -1: there is no file, and none is made */
+    int is_written; /* by the thread; 0: the file is only looked at, and there is no thread */
     pthread_t thread;
     pthread_mutex_t lock;
     pthread_cond_t changed;
@@ -228,6 +231,19 @@ static void *settings_file_main(void *arg)
 
 /* ---- the interface */
 
+static struct settings_file *settings_file_new(const char *path, const char *profile, const struct sh_report *report)
+{
+    struct settings_file *file = calloc(1, sizeof *file);
+    if (file == NULL) return NULL;
+    file->path = path;
+    file->report = report;
+    file->image.profile = profile;
+    file->fd = -1;
+    pthread_mutex_init(&file->lock, NULL);
+    pthread_cond_init(&file->changed, NULL);
+    return file;
+}
+
 static void settings_file_free(struct settings_file *file)
 {
     if (file->fd >= 0) close(file->fd);
@@ -245,41 +261,64 @@ static int read_from(struct settings_file *file, struct sh_err *err)
     return rc;
 }
 
-int settings_file_check(const char *path, const char *profile, struct sh_err *err)
+/* Opens the file for reading where a head has it. */
+static int open_of_a_head(struct settings_file *file, struct sh_err *err)
 {
-    struct settings_file file = {.path = path, .image = {.profile = profile}};
+    file->fd = open(file->path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    return file->fd >= 0 ? SH_OK : sh_fail(err, SH_EIO, "%s: %s", file->path, strerror(errno));
+}
+
+/* Checks whether a head could make the file, which is not there. */
+static int check_folder(const char *path, struct sh_err *err)
+{
+    char folder[PATH_MAX];
+    snprintf(folder, sizeof folder, "%.*s", (int)(basename(path) - path), path);
+    if (faccessat(AT_FDCWD, folder[0] != '\0' ? folder : ".", W_OK | X_OK, AT_EACCESS) == 0) return SH_OK;
+    return sh_fail(err, errno == ENOENT ? SH_EINPUT : SH_EPERM, "%s: cannot be made: %s", path, strerror(errno));
+}
+
+/* Hands the file out, or frees it after an error. */
+static int hand_out(int rc, const struct sh_err *why, struct settings_file *file, struct settings_file **out,
+                    struct sh_err *err)
+{
+    if (rc == SH_OK) {
+        *out = file;
+        return SH_OK;
+    }
+    settings_file_free(file);
+    return sh_fail(err, rc, "head.settings_file: %s", why->text);
+}
+
+int settings_file_look(const char *path, const char *profile, struct settings_file **out, struct sh_err *err)
+{
     struct sh_err why = {0};
-    const char *reason;
-    if (access(path, F_OK) != 0 && errno == ENOENT) return SH_OK;
-    FILE *in = infile_open(path, &reason);
-    const int rc = in != NULL ? read_image(&file, in, &why) : sh_fail(&why, SH_EINPUT, "%s: %s", path, reason);
-    if (in != NULL) fclose(in);
-    return rc == SH_OK ? SH_OK : sh_fail(err, rc, "head.settings_file: %s", why.text);
+    struct stat st;
+    int rc;
+    struct settings_file *file = settings_file_new(path, profile, NULL);
+    if (file == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
+    if (lstat(path, &st) != 0 && errno == ENOENT) {
+        rc = check_folder(path, &why);
+    } else {
+        rc = newfile_append(path, &file->fd, &why);
+        if (rc == SH_ESTATE) rc = open_of_a_head(file, &why);
+    }
+    if (rc == SH_OK && file->fd >= 0) rc = read_from(file, &why);
+    return hand_out(rc, &why, file, out, err);
 }
 
 int settings_file_open(const char *path, const char *profile, const struct sh_report *report,
                        struct settings_file **out, struct sh_err *err)
 {
     struct sh_err why = {0};
-    struct settings_file *file = calloc(1, sizeof *file);
+    struct settings_file *file = settings_file_new(path, profile, report);
     if (file == NULL) return sh_fail(err, SH_ENOMEM, "no memory");
-    file->path = path;
-    file->report = report;
-    file->image.profile = profile;
-    file->fd = -1;
-    pthread_mutex_init(&file->lock, NULL);
-    pthread_cond_init(&file->changed, NULL);
     int rc = newfile_append(path, &file->fd, &why);
     if (rc == SH_OK) rc = read_from(file, &why);
     if (rc == SH_ESTATE) rc = SH_EINPUT; /* another head has it */
     if (rc == SH_OK && pthread_create(&file->thread, NULL, settings_file_main, file) != 0)
         rc = sh_fail(&why, SH_EIO, "%s: no thread", path);
-    if (rc != SH_OK) {
-        settings_file_free(file);
-        return sh_fail(err, rc, "head.settings_file: %s", why.text);
-    }
-    *out = file;
-    return SH_OK;
+    file->is_written = rc == SH_OK;
+    return hand_out(rc, &why, file, out, err);
 }
 
 int settings_file_put(struct settings_file *file, const char *name, const char *text)
@@ -314,11 +353,13 @@ const char *settings_file_path(const struct settings_file *file)
 int settings_file_close(struct settings_file *file, struct sh_err *err)
 {
     if (file == NULL) return SH_OK;
-    pthread_mutex_lock(&file->lock);
-    file->ends = 1;
-    pthread_cond_signal(&file->changed);
-    pthread_mutex_unlock(&file->lock);
-    pthread_join(file->thread, NULL);
+    if (file->is_written) {
+        pthread_mutex_lock(&file->lock);
+        file->ends = 1;
+        pthread_cond_signal(&file->changed);
+        pthread_mutex_unlock(&file->lock);
+        pthread_join(file->thread, NULL);
+    }
     const int rc =
         file->error.code != SH_OK ? sh_fail(err, file->error.code, "head.settings_file: %s", file->error.text) : SH_OK;
     settings_file_free(file);

@@ -24,9 +24,9 @@ struct settings_file;
 int settings_file_open(const char *path, const char *profile, const struct sh_report *report,
                        struct settings_file **out, struct sh_err *err);
 
-/* Reads the file as settings_file_open does, but neither makes nor locks it: a head may have it. A missing file is
- * no error. */
-int settings_file_check(const char *path, const char *profile, struct sh_err *err);
+/* Reads the file as settings_file_open does, but neither makes nor writes it, and a head may have it. A missing file is
+ * no error where it could be made. What is put is then only kept in memory. */
+int settings_file_look(const char *path, const char *profile, struct settings_file **out, struct sh_err *err);
 
 /* Replaces what is stored under a name: whole lines with their '\n'; empty: nothing is stored there any more.
  * SH_EINPUT: a line is empty, too long, not printable ASCII or without its end; the text is too long; the name has

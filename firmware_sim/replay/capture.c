@@ -3,6 +3,7 @@
 
 #include <stdlib.h>
 
+#include "core/of_file.h"
 #include "firmware_sim/replay/capture_inside.h"
 
 int capture_load(const char *path, const struct sh_report *report, struct replay_capture **out, struct sh_err *err)
@@ -37,7 +38,7 @@ int capture_load(const char *path, const struct sh_report *report, struct replay
         capture_free(c);
     else
         *out = c;
-    return rc;
+    return sh_of_file(rc, err);
 }
 
 void capture_forget(struct replay_capture *c, uint32_t place)

@@ -38,7 +38,7 @@ struct replay_capture;
 
 /* 1: the file is a capture of packets, not a recording of the native stream. 0: it isn't, or it can't be read. */
 int capture_is(const char *path);
-/* SH_EINPUT, SH_EFORMAT, SH_EIO with the path; SH_ESTOPPED where the report, which may be NULL, ends the work. */
+/* SH_EINPUT, SH_EIO with the path; SH_ESTOPPED where the report, which may be NULL, ends the work. */
 int capture_load(const char *path, const struct sh_report *report, struct replay_capture **out, struct sh_err *err);
 void capture_free(struct replay_capture *capture);
 uint32_t capture_n(const struct replay_capture *capture);

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "core/err.h"
+#include "core/of_file.h"
 
 static struct recording_item *item_of(struct recording *r, uint32_t i)
 {
@@ -23,7 +23,7 @@ int recording_open_file(const char *path, struct scanhead **stream, struct sh_er
     char name[4096 + 3], why[512];
     snprintf(name, sizeof name, "%s%s", strchr(path, ':') != NULL && path[0] != '/' ? "./" : "", path);
     const int rc = scanhead_open(name, stream, why, sizeof why);
-    return rc == SCANHEAD_OK ? SH_OK : sh_fail(err, rc, "%s", why);
+    return rc == SCANHEAD_OK ? SH_OK : sh_of_file(sh_fail(err, rc, "%s", why), err);
 }
 
 static int open_stream(struct recording *r, struct sh_err *err)
@@ -145,7 +145,7 @@ static int read_one(struct recording *r, struct sh_err *err)
     struct scanhead_frame frame;
     const int rc = scanhead_next(r->stream, &frame, -1);
     if (rc == SCANHEAD_OK) return replay_recording_put(r, &frame, err);
-    if (rc != SCANHEAD_ECLOSED) return sh_fail(err, rc, "%s", scanhead_error(r->stream));
+    if (rc != SCANHEAD_ECLOSED) return sh_of_file(sh_fail(err, rc, "%s", scanhead_error(r->stream)), err);
     r->at_end = 1;
     return SH_OK;
 }

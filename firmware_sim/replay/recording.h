@@ -43,7 +43,7 @@ struct recording {
 
 /* Opens the file as a stream of the client library. Even a path such as tcp:1.shs names a file here. */
 int recording_open_file(const char *path, struct scanhead **stream, struct sh_err *err);
-/* recording: zeros. SH_EINPUT, SH_EFORMAT, SH_EIO with the path. recording_close is needed after a failure, too. */
+/* recording: zeros. SH_EINPUT, SH_EIO with the path. recording_close is needed after a failure, too. */
 int recording_open(struct recording *recording, const char *path, struct sh_err *err);
 /* Finds the device time of the last frame in a file of frames (.shs) that is not marked LOCAL, and reads only the
  * file's end. Returns 1; 0: that end has no such frame, or the file is of another form, or can't be read. */

@@ -37,8 +37,8 @@ struct replay_options {
 
 /* Opens the recording and reads it until a descriptor and an anchor have come, or to its end. Of cfg, links, loop and
  * faults are used; its profile and settings are set from the recording, as far as links need them. cfg, and what
- * options points to, must live until replay_free. SH_EINPUT: faults in the head, or a link whose protocol can't show
- * the recorded head; SH_EFORMAT: the file has no descriptor. */
+ * options points to, must live until replay_free. SH_EINPUT: faults in the head, a link whose protocol can't show the
+ * recorded head, or a file without a descriptor. */
 int replay_open(struct config *cfg, const struct replay_options *options, struct replay **out, struct sh_err *err);
 void replay_free(struct replay *replay);
 

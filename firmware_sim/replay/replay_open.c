@@ -43,7 +43,7 @@ static int read_front(struct replay *r, struct sh_err *err)
     }
     if (got < 0) return got;
     if (r->front.len[0] == 0)
-        return sh_fail(err, SH_EFORMAT, "%s: it has no descriptor: it is not a recording of a head's stream",
+        return sh_fail(err, SH_EINPUT, "%s: it has no descriptor: it is not a recording of a head's stream",
                        r->options.path);
     r->first_front = r->front;
     return recording_rewind(&r->recording, err);
@@ -169,7 +169,7 @@ int replay_open_recording(struct replay *r, struct sh_err *err)
     if (rc != SH_OK) return rc;
     const struct replay_front *front = &r->front;
     if (native_decode_descriptor(front->bytes[0] + NATIVE_HEADER_LEN, front->len[0] - NATIVE_HEADER_LEN, &d) != SH_OK)
-        return sh_fail(err, SH_EFORMAT, "%s: its descriptor can't be read", r->options.path);
+        return sh_fail(err, SH_EINPUT, "%s: its descriptor can't be read", r->options.path);
     keep_ascii(d.idn);
     replay_open_commands(r);
     replay_take_descriptor(r, &d);

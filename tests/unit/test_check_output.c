@@ -272,6 +272,29 @@ static void a_northing_counts_from_the_grid_s_equator(void **state)
     free(text);
 }
 
+/* A scene with coordinates of its own, given as UTM: easting 0 on the equator is 500 km west of the zone's middle, which
+ * is more than the grid reaches. The second station is 83 degrees east of zone 33's middle, the anchor's. A run needs
+ * neither grid. */
+static void a_grid_may_not_reach_a_station(void **state)
+{
+    (void)state;
+    write_scene(0, 0, 0);
+    char *text = checked(ONE, (const char *const[]){"scene.anchor={source: utm, utm_zone: 32, hemisphere: north}",
+                                                    "output.crs=utm", NULL});
+    has(text, "  utm       none: UTM zone 32 does not reach latitude 0, ...");
+    has(text, "  y axis    its azimuth is not known");
+    has(text, "output    ...");
+    has(text, "link      null, native");
+    free(text);
+    text =
+        checked("{name: one, lat_deg: 52, lon_deg: 98, height_m: 40}",
+                (const char *const[]){"scene.anchor={source: explicit, lat_deg: 52, lon_deg: 15, height_m: 0}", NULL});
+    has(text, "  geodetic  lat 52.000000000 lon 98.000000000 deg, height 40.0000 m");
+    has(text, "  utm       none: UTM zone 33 does not reach latitude 52, longitude 98 (Longitude 98d more than 60d...");
+    assert_non_null(strstr(text, " deg from true north; z axis "));
+    free(text);
+}
+
 /* 3 m and then 4 m, straight. The place on the Earth of all stops is that of the station. */
 static void platforms(void **state)
 {
@@ -399,6 +422,7 @@ int main(void)
         cmocka_unit_test(anchors),
         cmocka_unit_test(anchors_at_a_pole_and_in_ecef),
         cmocka_unit_test(a_northing_counts_from_the_grid_s_equator),
+        cmocka_unit_test(a_grid_may_not_reach_a_station),
         cmocka_unit_test(platforms),
         cmocka_unit_test(tripods),
         cmocka_unit_test(links_and_time),

@@ -68,6 +68,7 @@ static const struct lines_row OPERANDS[] = {
     {"--replay-journal is for a configuration, but $ is a recording of a head", {"run a.shs --replay-journal j"}},
     {"--surfaces is for a configuration, but $ is a recording of a head", {"run a.shs --surfaces j"}},
     {"--frames is for a configuration, but $ is a recording of a head", {"run a.shs --frames 1"}},
+    {"--threads is for a configuration, but $ is a recording of a head", {"run a.shs --threads 2"}},
     {"--speed is for a recording of a head, but $ is a capture of packets", {"run a.pcap --speed 2"}},
     {"--from is for a recording of a head, but $ is a capture of packets", {"run a.pcap --from 2"}},
     {"--to is for a recording of a head, but $ is a capture of packets", {"run a.pcap --to 2"}},

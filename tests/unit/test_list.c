@@ -7,16 +7,21 @@
 #include "tests/unit/output_rig.h"
 
 /* Returns what the command prints; free it. */
-static char *print_list(void)
+static char *print_list_with(int want)
 {
     char name[] = "list", *argv[] = {name, NULL};
     struct output output;
     output_take(&output, stdout);
     const int status = app_list.run(1, argv);
     char *text = output_give(&output);
-    assert_int_equal(status, APP_OK);
+    assert_int_equal(status, want);
     fake_expect_nothing_left();
     return text;
+}
+
+static char *print_list(void)
+{
+    return print_list_with(APP_OK);
 }
 
 /* The last lines, from the heads on USB on, are these. */
@@ -70,13 +75,26 @@ static void the_rest_of_the_list(void **state)
     free(text);
 }
 
+/* Nothing but the profiles themselves needs them. */
+static void without_profiles_the_rest_is_there(void **state)
+{
+    (void)state;
+    fake_reset();
+    setenv("SCANHEAD_HEADS", "/none/at/all", 1);
+    char *text = print_list_with(APP_USAGE);
+    unsetenv("SCANHEAD_HEADS");
+    assert_int_equal(strncmp(text, "links: pty", 10), 0);
+    assert_non_null(strstr(text, "\nscenarios: "));
+    assert_non_null(strstr(text, "\nheads on USB: none\n"));
+    free(text);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(heads_are_listed_in_their_order),
-        cmocka_unit_test(a_bus_may_have_no_head),
-        cmocka_unit_test(without_usb_the_reason_is_there),
-        cmocka_unit_test(the_rest_of_the_list),
+        cmocka_unit_test(heads_are_listed_in_their_order),    cmocka_unit_test(a_bus_may_have_no_head),
+        cmocka_unit_test(without_usb_the_reason_is_there),    cmocka_unit_test(the_rest_of_the_list),
+        cmocka_unit_test(without_profiles_the_rest_is_there),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

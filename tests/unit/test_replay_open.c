@@ -326,7 +326,7 @@ static void a_stream_has_a_descriptor(void **state)
     put_anchor(50.0, 0);
     file_end();
     snprintf(text, sizeof text, "%s: it has no descriptor: it is not a recording of a head's stream", file_path);
-    expect_refused(&plain, SH_EFORMAT, text);
+    expect_refused(&plain, SH_EINPUT, text);
     char path[4200];
     memset(path, 'x', sizeof path - 1);
     path[sizeof path - 1] = '\0';

@@ -145,7 +145,7 @@ static void expect_refused(const char *text, const char *const says[2])
         strstr(err.text, says[1]) == NULL)
         fail_msg("%s%d, %s", text, rc, rc == SH_OK ? "" : err.text);
     struct sh_err said = err;
-    assert_int_equal(settings_file_check(path, "puck", &err), SH_EINPUT);
+    assert_int_equal(settings_file_look(path, "puck", &file, &err), SH_EINPUT);
     assert_string_equal(err.text, said.text);
     expect_text(text);
 }
@@ -161,25 +161,63 @@ static void a_broken_or_foreign_file_is_refused_and_stays(void **state)
     expect_refused(text, (const char *const[]){":3: too long a setting; allowed are 478", ""});
 }
 
+static void look(void)
+{
+    struct settings_file *file;
+    if (settings_file_look(path, "puck", &file, &err) != SH_OK) fail_msg("%s", err.text);
+    assert_int_equal(settings_file_put(file, "head", "HEAD:LINes 30\n"), SH_OK); /* is kept in memory */
+    close_file(file);
+}
+
 /* A check of the configuration looks at the file while a head may have it. What is missing, a head makes. */
-static void a_check_neither_makes_nor_locks_it(void **state)
+static void a_check_neither_makes_nor_writes_it(void **state)
 {
     (void)state;
-    char want[200];
     begin();
-    assert_int_equal(settings_file_check(path, "puck", &err), SH_OK);
+    look();
     assert_int_equal(access(path, F_OK), -1);
     struct settings_file *file = open_file();
     assert_int_equal(settings_file_put(file, "head", "HEAD:LINes 15\n"), SH_OK);
-    assert_int_equal(settings_file_check(path, "puck", &err), SH_OK);
+    look();
     close_file(file);
-    assert_int_equal(settings_file_check(path, "puck", &err), SH_OK);
+    look();
+    expect_text("scanhead settings 1\nprofile puck\nhead HEAD:LINes 15\nend\n");
     close_file(open_file()); /* nobody has it */
     begin();
+}
+
+static void expect_both_refuse(const char *of)
+{
+    struct settings_file *file;
+    char want[200];
+    snprintf(want, sizeof want, "head.settings_file: %s: ", of);
+    for (int looks = 0; looks < 2; looks++) {
+        const int rc =
+            looks ? settings_file_look(of, "puck", &file, &err) : settings_file_open(of, "puck", NULL, &file, &err);
+        assert_int_equal(rc, SH_EINPUT);
+        assert_int_equal(strncmp(err.text, want, strlen(want)), 0);
+    }
+}
+
+/* A check refuses each path that a head could not write. */
+static void a_check_refuses_what_a_head_refuses(void **state)
+{
+    (void)state;
+    char other[160];
+    begin();
+    snprintf(other, sizeof other, "%s/none", path);
+    expect_both_refuse(other); /* no such folder */
     assert_int_equal(mkfifo(path, 0600), 0);
-    assert_int_equal(settings_file_check(path, "puck", &err), SH_EINPUT);
-    snprintf(want, sizeof want, "head.settings_file: %s: a FIFO, not a file", path);
-    assert_string_equal(err.text, want);
+    expect_both_refuse(path);
+    begin();
+    assert_int_equal(symlink("nothing", path), 0);
+    expect_both_refuse(path);
+    begin();
+    write_text("");
+    snprintf(other, sizeof other, "%s.hard", path);
+    assert_int_equal(link(path, other), 0);
+    expect_both_refuse(path);
+    unlink(other);
     begin();
 }
 
@@ -385,7 +423,8 @@ int main(void)
         cmocka_unit_test(nothing_new_is_not_written),
         cmocka_unit_test(wrong_text_is_refused),
         cmocka_unit_test(a_broken_or_foreign_file_is_refused_and_stays),
-        cmocka_unit_test(a_check_neither_makes_nor_locks_it),
+        cmocka_unit_test(a_check_neither_makes_nor_writes_it),
+        cmocka_unit_test(a_check_refuses_what_a_head_refuses),
         cmocka_unit_test(a_file_has_its_limits),
         cmocka_unit_test(two_heads_have_no_file_in_common),
         cmocka_unit_test(a_file_of_another_is_not_replaced),

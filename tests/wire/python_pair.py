@@ -41,8 +41,10 @@ def misuse(path):
     os.mkfifo(path + ".fifo")
     for source in ("/", "/dev/zero", path + ".fifo"):
         refused(scanhead.open, source)
+    with open(path + ".shs", "wb") as recording:
+        recording.write(framed(200, 0, 0, b""))  # of a kind that no head sends yet
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()) as said:
-        assert scanhead.main([path, "*IDN?"]) == 1
+        assert scanhead.main([path + ".shs", "*IDN?"]) == 2
     assert "a recording takes no commands" in said.getvalue()
     for head in (scanhead.open(path), pair()[0]):
         head.close()

@@ -171,6 +171,28 @@ static void test_misuse(void **state)
     assert_string_equal(ask_python(*state, "plain", "misuse", path, NULL), "refused\n");
 }
 
+/* The module as a program: a file that is no recording is an error, with the status that scanhead has for it. */
+static void test_no_recording(void **state)
+{
+    struct wire *wire = *state;
+    static const struct {
+        const char *file, *text, *says;
+    } rows[] = {{"empty.shs", "", "empty.shs: no frame in 0 bytes: "},
+                {"junk.shs", "not a stream\n", "junk.shs: no frame in 13 bytes: "},
+                {"none.shs", NULL, "none.shs: No such file"}};
+    need_python();
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        if (rows[i].text != NULL) wire_write_text(wire, rows[i].file, rows[i].text);
+        const char *const args[] = {"drivers/host/python/scanhead.py", wire_path(wire, rows[i].file), NULL};
+        wire_run_program(wire, python, args, 2);
+        char *out = wire_read(wire_path(wire, "out"), NULL), *err = wire_read(wire_path(wire, "err"), NULL);
+        assert_string_equal(out, "");
+        assert_non_null(strstr(err, rows[i].says));
+        free(out);
+        free(err);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -179,6 +201,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(test_hostile, setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_ends, setup, wire_teardown),
         cmocka_unit_test_setup_teardown(test_misuse, setup, wire_teardown),
+        cmocka_unit_test_setup_teardown(test_no_recording, setup, wire_teardown),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

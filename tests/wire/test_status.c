@@ -32,6 +32,8 @@ static const struct {
     /* the command line */
     {"", WRONG},
     {"fly", WRONG},
+    {"--version", DONE},
+    {"--version extra", WRONG},
     {"run @config.yaml --fly", WRONG},
     {"record @config.yaml -o @x.ply --fly", WRONG},
     {"plan @config.yaml --fly", WRONG},
@@ -74,6 +76,10 @@ static const struct {
     {"map @config.yaml -o @x.png --set scene.meshes[0].file=none.obj", WRONG},
     {"check @config.yaml --set links[0].address=300.1.1.1", WRONG},
     {"run @config.yaml --set links[0].address=300.1.1.1", WRONG},
+    {"check @config.yaml --set head.settings_file=@none/x", WRONG},
+    {"run @config.yaml --set head.settings_file=@none/x", WRONG},
+    {"check @config.yaml --set head.settings_file=@stored", WRONG},
+    {"run @config.yaml --set head.settings_file=@stored", WRONG},
 
     /* input files: missing, or of another kind */
     {"init @none.obj", WRONG},
@@ -86,6 +92,30 @@ static const struct {
     {"view @faulty.yaml", WRONG},
     {"record @none.shs -o @x.ply", WRONG},
     {"record @fifo.shs -o @x.ply", WRONG},
+    {"run @none.shs --link null", WRONG},
+    {"run @none.pcap", WRONG},
+    {"run @scan.shs --link null", WRONG}, /* nobody could begin it */
+    {"run @empty.shs --start --link null", WRONG},
+    {"run @junk.shs --start --link null", WRONG},
+    {"run @empty.pcap", WRONG},
+    {"run @junk.pcap", WRONG},
+    {"run @empty.pcapng", WRONG},
+    {"run @junk.pcapng", WRONG},
+    {"record @empty.shs -o @x.ply", WRONG},
+    {"record @junk.shs -o @x.ply", WRONG},
+    {"record @junk.pcapng -o @x.ply", WRONG},
+    {"record --repair @empty.shs", WRONG},
+    {"record --repair @junk.shs", WRONG},
+    {"record --repair @junk.pcapng", WRONG},
+    {"record --repair @junk.ply", WRONG},
+    {"record --repair @none.shs", WRONG},
+    {"view @empty.shs", WRONG},
+    {"view @junk.shs", WRONG},
+    {"view @junk.pcapng", WRONG},
+    {"view @junk.ply", WRONG},
+    {"report @config.yaml @junk.ply", WRONG},
+    {"report @config.yaml @junk.las", WRONG},
+    {"map @config.yaml -o @x.png --cloud @junk.ply", WRONG},
     {"run @config.yaml --replay-journal @none", WRONG},
     {"run @config.yaml --replay-journal @scan.shs", WRONG},
     {"run @config.yaml --set platform.kind=trajectory --set platform.file=@none.csv", WRONG},
@@ -108,6 +138,9 @@ static const struct {
     {"report @config.yaml @scan.ply --tolerance-m 1e-12", FAILED},
 };
 
+static const char *const BROKEN[] = {"empty.shs", "empty.pcap",  "empty.pcapng", "junk.shs",
+                                     "junk.pcap", "junk.pcapng", "junk.ply",     "junk.las"};
+
 /* Writes the first half of a recorded stream. */
 static void cut_stream(const struct wire *wire)
 {
@@ -127,6 +160,10 @@ static void write_files(const struct wire *wire)
                                                   .frames = 1,
                                                   .links = LINK_YAML_TCP});
     wire_write_text(wire, "faulty.yaml", "head: {profile: full-sweep, frames: -1}\n");
+    for (size_t i = 0; i < sizeof BROKEN / sizeof BROKEN[0]; i++)
+        wire_write_text(wire, BROKEN[i], strncmp(BROKEN[i], "empty", 5) == 0 ? "" : "neither stream nor cloud\n");
+    /* HEAD:FOO is no command of the head */
+    wire_write_text(wire, "stored", "scanhead settings 1\nprofile full-sweep\nhead HEAD:FOO 1\nend\n");
     assert_int_equal(mkfifo(wire_path(wire, "fifo.yaml"), 0600), 0);
     assert_int_equal(mkfifo(wire_path(wire, "fifo.shs"), 0600), 0);
     assert_int_equal(mkfifo(wire_path(wire, "fifo.obj"), 0600), 0);

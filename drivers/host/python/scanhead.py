@@ -1764,6 +1764,9 @@ def _summary(head: Head) -> None:
         if frame.type == POINTS and head.can_place():
             count = head.points(frame).echo_count
             echoes += int(np.count_nonzero(count)) if np is not None else sum(n > 0 for n in count)
+    if not kinds:
+        raise ScanheadError(f"{head._source.name}: no frame in {head.parser.bad_bytes} bytes: "
+                            "this is not a scan head's stream")
     names = ("", "descriptors", "anchors", "points frames", "line ends", "telemetry", "events", "names",
              "poses", "attributes", "emitters", "colours", "waveforms")
     print(*(f"{kinds[k]} {names[k]}" for k in sorted(kinds) if k < len(names)), sep=", ")
@@ -1787,7 +1790,7 @@ def main(arguments: List[str]) -> int:
                 print(f"{line}  {head.query(line)}")
     except ScanheadError as error:
         print(error, file=sys.stderr)
-        return 1
+        return 1 if arguments[0].startswith(("tcp:", "tty:")) else 2  # a file that is wrong, as in scanhead
     except KeyboardInterrupt:
         return 130
     return 0

@@ -30,7 +30,7 @@ static void default_links(const struct capture_run *run, char *text, size_t cap)
     for (uint32_t i = 0; i < capture_n(run->capture) && n_links < CONFIG_MAX_LINKS && n < cap; i++) {
         const struct capture_place *place = capture_place(run->capture, i);
         if (!is_wanted(run->o, place)) continue;
-        n += (size_t)snprintf(text + n, cap - n, "- {type: %s, port: %d, protocol: capture}\n",
+        n += (size_t)snprintf(text + n, cap - n, "{type: %s, port: %d, protocol: capture},\n",
                               place->is_tcp ? "tcp" : "udp", place->is_tcp ? 0 : place->port);
         n_links++;
     }
@@ -43,7 +43,8 @@ static void given_links(const char *given, char *text, size_t cap)
     while (*given != '\0' && n < cap) {
         const size_t len = strcspn(given, "\n");
         const int says = memmem(given, len, "protocol:", 9) != NULL;
-        n += (size_t)snprintf(text + n, cap - n, "%.*s%s\n", (int)len - 1, given, says ? "}" : ", protocol: capture}");
+        n +=
+            (size_t)snprintf(text + n, cap - n, "%.*s%s\n", (int)len - 2, given, says ? "}," : ", protocol: capture},");
         given += len + (given[len] == '\n');
     }
 }
@@ -192,7 +193,7 @@ static int with_links(struct capture_run *run)
         given_links(o->links, links, sizeof links);
     else
         default_links(run, links, sizeof links);
-    snprintf(text, sizeof text, "links:%s%s", links[0] != '\0' ? "\n" : " []", links);
+    snprintf(text, sizeof text, "links: [%s]", links);
     o->in.links = text;
     return app_with_config(&o->in, serve, run);
 }

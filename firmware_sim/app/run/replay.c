@@ -6,7 +6,8 @@
 #include "firmware_sim/app/run/run.h"
 #include "firmware_sim/config/config.h"
 
-static const char DEFAULT_LINKS[] = "links:\n- {type: pty}\n- {type: tcp}\n";
+/* Each --link is a line of YAML, from 1 on, so the line in a message is the number of the option. */
+static const char DEFAULT_LINKS[] = "links: [{type: pty}, {type: tcp}]";
 
 int run_take_link(void *values, const char *text)
 {
@@ -16,7 +17,7 @@ int run_take_link(void *values, const char *text)
     if (text[0] == '\0' || strpbrk(text, "\n#") != NULL)
         return app_usage(&app_run, "--link '%.40s': allowed are pty, tcp, ... or keys such as 'type: tcp, port: 5025'",
                          text);
-    const int n = snprintf(o->links + used, sizeof o->links - used, is_word ? "- {type: %s}\n" : "- {%s}\n", text);
+    const int n = snprintf(o->links + used, sizeof o->links - used, is_word ? "{type: %s},\n" : "{%s},\n", text);
     if (n >= (int)(sizeof o->links - used))
         return app_usage(&app_run, "--link: too long; all --link together share %zu characters", sizeof o->links - 1);
     return APP_OK;
@@ -28,7 +29,7 @@ static const struct {
     int kinds;
     const char *names, *options[6];
 } only[] = {
-    {HEAD, "a configuration", {"journal", "replay-journal", "surfaces", "frames"}},
+    {HEAD, "a configuration", {"journal", "replay-journal", "surfaces", "frames", "threads"}},
     {RECORDING, "a recording of a head", {"speed", "from", "to", "clients", "config"}},
     {CAPTURE, "a capture of packets", {"unknown", "device-port"}},
     {HEAD | RECORDING, "a configuration or a recording", {"view"}},
@@ -95,6 +96,18 @@ static int serve(const struct run_options *o, struct replay *replay, struct loop
     return app_and_also(rc, replay_check(replay, &why), &why, err);
 }
 
+/* Without --start a client begins the recording. */
+static int check_start(const struct run_options *o, const struct config *cfg, struct sh_err *err)
+{
+    for (uint32_t i = 0; i < cfg->n_links; i++)
+        if (cfg->link[i].type != LINK_NULL && cfg->link[i].type != LINK_FILE) return SH_OK;
+    if (o->device.start) return SH_OK;
+    return sh_fail(err, SH_EINPUT,
+                   "%s: without --start a client begins the replay, and null and file links have none; allowed are "
+                   "--start, or another link",
+                   o->in.operand[0]);
+}
+
 /* If the links had room for fewer clients than --clients says, the recording would never begin. A USB link has a
  * console, too. */
 static int check_clients(const struct run_options *o, const struct config *cfg, struct sh_err *err)
@@ -118,6 +131,7 @@ static int replay(struct config *cfg, void *ctx, struct sh_err *err)
     struct loop *loop = NULL;
     const struct loop_options options = {.hash = o->stats != NULL && !o->no_hash, .report = &app_report_stderr};
     int rc = run_complete_links(o, cfg, err);
+    if (rc == SH_OK) rc = check_start(o, cfg, err);
     if (rc == SH_OK) rc = check_clients(o, cfg, err);
     if (rc == SH_OK && o->replay.speed > 0.0 && cfg->loop.pace != PACE_REALTIME)
         rc = sh_fail(err, SH_EINPUT, "--speed: allowed only with the pace realtime");
@@ -142,7 +156,7 @@ int run_replay(struct run_options *o)
 {
     char text[sizeof o->links + 16];
     struct app_input in = o->in;
-    snprintf(text, sizeof text, "links:\n%s", o->links);
+    snprintf(text, sizeof text, "links: [%s]", o->links);
     if (o->config != NULL)
         in.operand[0] = o->config;
     else

@@ -7,6 +7,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#include "core/of_file.h"
 #include "firmware_sim/app/app.h"
 #include "firmware_sim/app/studio/record/heads.h"
 #include "firmware_sim/app/surfaces.h"
@@ -386,9 +387,11 @@ int record_job_stream(struct record_job *r, struct sh_err *err)
     struct scanhead *sh = NULL;
     char why[512];
     int rc = open_stream(r, &sh, why, sizeof why);
-    if (rc != SCANHEAD_OK) return sh_fail(err, rc, "%s", why);
+    if (app_is_recording(r->source)) r->recording.file = r->source;
+    if (rc != SCANHEAD_OK) sh_fail(err, rc, "%s", why);
+    if (rc != SCANHEAD_OK) return r->recording.file != NULL ? sh_of_file(rc, err) : rc;
     struct stat st;
-    if (app_is_recording(r->source)) r->recording.listen = r->files.recorder.may_wait = 1;
+    if (r->recording.file != NULL) r->recording.listen = r->files.recorder.may_wait = 1;
     if (r->recording.listen && stat(r->source, &st) == 0 && S_ISREG(st.st_mode))
         r->recording.source_bytes = (uint64_t)st.st_size;
     if (r->station == APP_WORD && !r->recording.listen) {

@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "core/of_file.h"
 #include "drivers/protocol/native.h"
 #include "firmware_sim/app/progress.h"
 #include "firmware_sim/base/clock.h"
@@ -216,6 +217,13 @@ static int is_long_enough(const struct recording *r, const struct scanhead_frame
     return (double)native_since_ns(frame->t_ns, r->scan_t0_ns) >= 1e9 * r->o->duration_s;
 }
 
+static int fail_end(const struct recording *r, int code, const char *how, struct sh_err *err)
+{
+    const char *file = r->o->file;
+    if (file == NULL) return sh_fail(err, code, "the stream ended %s", how);
+    return sh_of_file(sh_fail(err, code, "%s: the stream ended %s", file, how), err);
+}
+
 /* Takes one frame. Returns 1: got one; 0: none in time; negative: the recording is over. */
 static int step(struct recording *r, int timeout_ms, struct sh_err *err)
 {
@@ -226,7 +234,8 @@ static int step(struct recording *r, int timeout_ms, struct sh_err *err)
     if (reported != SH_OK) return reported;
     if (rc == SCANHEAD_ETIMEOUT) return 0;
     if (is_gone(r, rc) && !r->is_done) return replug(r, rc, err);
-    if (rc != SCANHEAD_OK) return sh_fail(err, rc, "%s", scanhead_error(r->sh));
+    if (rc != SCANHEAD_OK) sh_fail(err, rc, "%s", scanhead_error(r->sh));
+    if (rc != SCANHEAD_OK) return r->o->file != NULL ? sh_of_file(rc, err) : rc;
     look_at(r, &frame);
     if (frame.type == SCANHEAD_POINTS) {
         r->heard_ns = r->pulses_ns = r->now_ns;
@@ -432,8 +441,7 @@ int recording_run(struct scanhead *sh, const struct recording_options *options, 
     scanhead_get_stats(sh, &result->stream);
     if (options->hash) scanhead_hash_hex(sh, result->sha256);
     if (rc == SH_ECLOSED && options->listen && result->frames == 0)
-        return sh_fail(err, SH_EFORMAT, "the stream ended without a frame");
+        return fail_end(&r, SH_EFORMAT, "without a frame", err);
     if (rc == SH_ECLOSED && options->listen && !result->counts.within) return SH_OK;
-    return rc == SH_ECLOSED && result->counts.within ? sh_fail(err, rc, "the stream ended in the middle of a scan")
-                                                     : rc;
+    return rc == SH_ECLOSED && result->counts.within ? fail_end(&r, rc, "in the middle of a scan", err) : rc;
 }

@@ -26,6 +26,7 @@ struct recording_options {
     double replug_s;       /* > 0: how long to wait for a head that was unplugged, to go on then */
     int hash;              /* keep stream_sha256 */
     int progress;          /* 1: to the report, about once a second */
+    const char *file;      /* path of the recording that is the source; NULL: the source is a head */
     uint64_t source_bytes; /* of a stream in a file, for progress; 0: not known */
     const struct sh_report *report;
     /* Before each scan, while the head is idle; station as above. NULL: there is nothing to do. */

@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
+#include "core/of_file.h"
 #include "drivers/record/repair.h"
 #include "firmware_sim/app/app.h"
 
@@ -66,7 +67,7 @@ int record_repair(const char *const *paths, int n, const char *stats, int quiet)
     for (int i = 0; i < n; i++) {
         struct result *r = &all.of[i];
         r->path = paths[i];
-        const int rc = repair_file(paths[i], &app_report_seconds, &r->file, &r->err);
+        const int rc = sh_of_file(repair_file(paths[i], &app_report_seconds, &r->file, &r->err), &r->err);
         r->status = rc == SH_OK ? APP_OK : app_fail(&r->err);
         if (rc == SH_OK && !quiet) repair_say(&r->file);
         if (r->status > status) status = r->status;

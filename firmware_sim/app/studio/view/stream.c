@@ -9,6 +9,7 @@
 #include <sys/stat.h>
 
 #include "core/grow.h"
+#include "core/of_file.h"
 #include "core/pose.h"
 #include "drivers/host/scanhead.h"
 #include "drivers/protocol/native.h"
@@ -236,6 +237,5 @@ int viewed_load_stream(struct viewed *v, const struct sh_report *report, struct 
     free(s->at);
     free(s);
     scanhead_close(sh);
-    if (rc == SH_EFORMAT) err->code = rc = SH_EINPUT; /* the file is what is wrong */
-    return rc;
+    return sh_of_file(rc, err);
 }
