@@ -45,6 +45,16 @@ static void attach(struct bvh *bvh, uint32_t n, RTCBoundsFunction bounds, RTCInt
     rtcReleaseGeometry(geometry);
 }
 
+/* Where oneTBB is refused the first memory that it asks for, it waits without end (2022.1, Debian 13). So more than
+ * that is asked for before. */
+static int check_memory(struct sh_err *err)
+{
+    void *volatile room = malloc(2 << 20);
+    if (room == NULL) return embree_fail(RTC_ERROR_OUT_OF_MEMORY, err);
+    free(room);
+    return SH_OK;
+}
+
 /* Builds Embree's tree, unless report asks to stop. */
 static int commit(struct bvh *bvh, const struct sh_report *report, struct sh_err *err)
 {
@@ -66,6 +76,7 @@ static int build(struct bvh *bvh, unsigned threads, const struct sh_report *repo
 {
     int rc = bvh_make_leaves(bvh, report, err);
     if (rc == SH_OK) rc = bvh_make_copies(bvh, threads, report, err);
+    if (rc == SH_OK) rc = check_memory(err);
     if (rc == SH_OK) rc = commit(bvh, report, err);
     if (rc == SH_OK) rc = bvh_find_planes(bvh, report, err);
     return rc;

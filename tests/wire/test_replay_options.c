@@ -168,7 +168,7 @@ static void test_client_that_has_sent_all(void **state)
 /* Waits until the head has closed its ends of all connections to a port that their clients have closed. */
 static void wait_closed(int port)
 {
-    const int64_t end_ms = wire_now_ms() + SOON_MS;
+    const int64_t end_ms = wire_now_ms() + DEADLINE_MS;
     for (int n = 1; n != 0; poll(NULL, 0, n)) {
         char line[512];
         FILE *f = fopen("/proc/net/tcp", "r");
