@@ -115,8 +115,8 @@ static void test_hidden(void **state)
     }
 }
 
-/* Two overlapping discs are at the same depth. They meet halfway between their points, as the cells of two neighbours on
- * a wall do, in either order. Each disc is 20 pixels wide, and the points are 10 pixels apart: columns 95 and 105. */
+/* Two overlapping discs are at the same depth. They meet halfway between their points, in either order, as do the cells
+ * of two neighbours on a wall. Each disc is 20 pixels wide, and the points are 10 pixels apart: columns 95 and 105. */
 static void test_overlap(void **state)
 {
     (void)state;
