@@ -29,4 +29,7 @@ int end_job(void **state);
 void run_job(int (*run)(void), int rc);
 extern char *said;
 
+extern int asks_fit;      /* heads ask whether a scan fits, also without a duration */
+extern double fits_shots; /* how many shots the files were told then */
+
 #endif

@@ -116,6 +116,30 @@ static void concave_fields_and_heads_inside(void **state)
     assert_false(has(&empty, 0, 0));
 }
 
+/* A field that begins one micrometre beside the head does not begin at the head. One with the head on its border does,
+ * and one that is behind the head is not met. */
+static void fields_beside_the_head(void **state)
+{
+    (void)state;
+    for (int turn = 0; turn < 4; turn++)
+        for (int32_t from = -1; from <= 1; from++) {
+            static const int32_t cosine[] = {1, 0, -1, 0}, sine[] = {0, 1, 0, -1};
+            const int32_t along[] = {from, 1000, 1000, from}, across[] = {-500, -500, 500, 500};
+            int32_t corner[4][2], near_um, far_um;
+            for (int i = 0; i < 4; i++) {
+                corner[i][0] = cosine[turn] * along[i] - sine[turn] * across[i];
+                corner[i][1] = sine[turn] * along[i] + cosine[turn] * across[i];
+            }
+            const struct cola_shape s = polygon(corner, 4);
+            assert_true(cola_shape_cut(&s, 0.25 * turn, &near_um, &far_um));
+            assert_int_equal(near_um, from > 0 ? from : 0);
+            assert_int_equal(far_um, 1000);
+            const int behind = cola_shape_cut(&s, 0.25 * turn + 0.5, &near_um, &far_um);
+            assert_int_equal(behind, from <= 0);
+            if (behind) assert_true(near_um == 0 && far_um == -from);
+        }
+}
+
 static int in_sector(const struct cola_shape *s, int32_t step, int32_t steps, int32_t range_um)
 {
     const struct cola_measured m = cola_measured_at(step, steps, range_um);
@@ -269,15 +293,11 @@ static void lengths_at_their_limits(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(random_polygons_agree),
-        cmocka_unit_test(edges_belong_to_the_field),
-        cmocka_unit_test(concave_fields_and_heads_inside),
-        cmocka_unit_test(sectors_have_their_limits),
-        cmocka_unit_test(rectangles_turn_about_their_corner),
-        cmocka_unit_test(lengths_at_their_limits),
-        cmocka_unit_test(points_are_rounded_to_a_micrometre),
-        cmocka_unit_test(chains_join_their_links),
-        cmocka_unit_test(an_outline_of_a_sector_has_two_arcs),
+        cmocka_unit_test(random_polygons_agree),           cmocka_unit_test(edges_belong_to_the_field),
+        cmocka_unit_test(concave_fields_and_heads_inside), cmocka_unit_test(fields_beside_the_head),
+        cmocka_unit_test(sectors_have_their_limits),       cmocka_unit_test(rectangles_turn_about_their_corner),
+        cmocka_unit_test(lengths_at_their_limits),         cmocka_unit_test(points_are_rounded_to_a_micrometre),
+        cmocka_unit_test(chains_join_their_links),         cmocka_unit_test(an_outline_of_a_sector_has_two_arcs),
     };
     return cmocka_run_group_tests_name("cola shape", tests, NULL, NULL);
 }

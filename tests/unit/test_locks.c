@@ -82,6 +82,26 @@ static void a_move_is_locked(void **state)
     rig_close(rig);
 }
 
+/* A tick that replays a move takes the lock four times: at first, once the move is planned, to end the move, and to go
+ * on after that. */
+static void a_replayed_move_is_locked(void **state)
+{
+    (void)state;
+    FILE *f = fopen(journal_path, "w");
+    assert_non_null(f);
+    fputs("# scanhead journal 1\n310 310000000 1 SITE:POSE 1, 0.1,0,0,0,0,0\n", f);
+    assert_int_equal(fclose(f), 0);
+    struct rig *rig = rig_open(&(struct device_options){.replay = journal_path}, NULL, 0);
+    rig_go_to(rig, 309);
+    TAKES(1, device_claim(rig->device, &rig->work));
+    device_done(&rig->work);
+    TAKES(4, device_claim(rig->device, &rig->work));
+    device_done(&rig->work);
+    assert_string_equal(rig_tell(rig, "SITE:POSE? 1", 310), "0.1,0,0,0,0,0");
+    rig_close(rig);
+    unlink(journal_path);
+}
+
 static void the_head_follows_a_pose_with_its_lock(void **state)
 {
     (void)state;
@@ -228,13 +248,10 @@ static void a_recording_is_locked(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_device_is_locked),
-        cmocka_unit_test(a_move_is_locked),
-        cmocka_unit_test(the_head_follows_a_pose_with_its_lock),
-        cmocka_unit_test(the_faults_are_locked),
-        cmocka_unit_test(notes_of_faults_are_locked),
-        cmocka_unit_test(stored_settings_are_locked),
-        cmocka_unit_test(replies_of_moves_are_locked),
+        cmocka_unit_test(the_device_is_locked),       cmocka_unit_test(a_move_is_locked),
+        cmocka_unit_test(a_replayed_move_is_locked),  cmocka_unit_test(the_head_follows_a_pose_with_its_lock),
+        cmocka_unit_test(the_faults_are_locked),      cmocka_unit_test(notes_of_faults_are_locked),
+        cmocka_unit_test(stored_settings_are_locked), cmocka_unit_test(replies_of_moves_are_locked),
         cmocka_unit_test(a_recording_is_locked),
     };
     return cmocka_run_group_tests_name("locks", tests, make_folder, remove_folder);

@@ -110,7 +110,8 @@ static void close_it(void)
     assert_int_equal(n_closed, 1);
 }
 
-/* Each state but off and boot means that the head is up; an event says it, or telemetry does. */
+/* Each state but off and boot means that the head is up; an event says it, or telemetry does. Other frames do not,
+ * and neither does telemetry that is cut short. */
 static void the_head_is_up(void **state)
 {
     (void)state;
@@ -123,13 +124,18 @@ static void the_head_is_up(void **state)
             {.type = SCANHEAD_EVENT, .event = SCANHEAD_EV_TIME, .event_value = {HEAD_IDLE}},
             {.type = SCANHEAD_EVENT, .event = SCANHEAD_EV_STATE, .event_value = {to, HEAD_IDLE}},
             {0}};
-        const struct scanhead_frame telemetry[] = {{.type = SCANHEAD_TELEMETRY, .payload = payload, .payload_len = 3},
-                                                   {.type = SCANHEAD_LINE_END, .payload = payload, .payload_len = 8},
-                                                   {.type = SCANHEAD_TELEMETRY, .payload = payload, .payload_len = 4},
+        const struct scanhead_frame none[] = {{.type = SCANHEAD_TELEMETRY, .payload = payload, .payload_len = 3},
+                                              {.type = SCANHEAD_LINE_END, .payload = payload, .payload_len = 8},
+                                              {.type = SCANHEAD_EVENT, .payload = payload, .payload_len = 8},
+                                              {0}};
+        const struct scanhead_frame telemetry[] = {{.type = SCANHEAD_TELEMETRY, .payload = payload, .payload_len = 4},
                                                    {0}};
         read_all(event, 0);
         assert_int_equal(atomic_load(&stream.is_up), is_up);
         assert_int_equal(n_next, 3); /* a wait without a frame ends nothing */
+        close_it();
+        read_all(none, 0);
+        assert_int_equal(atomic_load(&stream.is_up), 0);
         close_it();
         read_all(telemetry, 0);
         assert_int_equal(atomic_load(&stream.is_up), is_up);

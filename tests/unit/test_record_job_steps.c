@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The steps of a job of `record`: how it waits for its source, which files it keeps, what it says, and what ends it. */
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -309,6 +310,35 @@ static void heads_off_line(void **state)
     assert_non_null(strstr(trace, "open_parts fits_files drop_parts "));
 }
 
+/* Files are told how many shots a scan has at most. A sweep of the rig has 100 lines of 25 cast pulses. A scan without
+ * end that ends with the vehicle's way has any number, whether the command asks for it or the configuration. */
+static void shots_of_a_scan(void **state)
+{
+    static const struct {
+        long option;
+        uint32_t configured;
+        double duration_s, shots;
+    } rows[] = {{-1, 3, 0, 7500},
+                {2, 3, 0, 5000},
+                {1, 0, 0, 2500},
+                {2, 3, 9, (double)INFINITY},
+                {0, 3, 0, (double)INFINITY},
+                {-1, 0, 0, (double)INFINITY}};
+    (void)state;
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+        again();
+        cfg->platform.kind = PLATFORM_TRAJECTORY;
+        cfg->platform.at_end = PLATFORM_STOP;
+        cfg->head.settings.frames = rows[i].configured;
+        job.recording.frames = rows[i].option;
+        job.recording.duration_s = rows[i].duration_s;
+        asks_fit = 1;
+        fits_shots = -1;
+        run_job(off_line, SH_OK);
+        if (fits_shots != rows[i].shots) fail_msg("row %zu: %.17g shots", i, fits_shots);
+    }
+}
+
 static void off_line_failures(void **state)
 {
     static const struct {
@@ -344,6 +374,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(each_step_may_fail, make_job, end_job),
         cmocka_unit_test_setup_teardown(what_it_says, make_job, end_job),
         cmocka_unit_test_setup_teardown(heads_off_line, make_job, end_job),
+        cmocka_unit_test_setup_teardown(shots_of_a_scan, make_job, end_job),
         cmocka_unit_test_setup_teardown(off_line_failures, make_job, end_job),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -103,6 +103,21 @@ static void test_groups_and_texts(void **state)
     assert_string_equal(text, "unknown address");
 }
 
+/* The reason is the resolver's. No label of a name has more than 63 characters (RFC 1035), so no server is asked. */
+static void test_no_such_address(void **state)
+{
+    (void)state;
+    char host[80] = {0}, text[200];
+    memset(host, 'a', 70);
+    struct addrinfo *list;
+    const int why = getaddrinfo(host, "7", &(const struct addrinfo){.ai_socktype = SOCK_STREAM}, &list);
+    assert_true(why != 0 && why != EAI_SYSTEM);
+    errno = EIO; /* an older error that has nothing to do with it */
+    assert_int_equal(socket_resolve("test", host, 7, SOCK_STREAM, &list, &err), SH_EINPUT);
+    snprintf(text, sizeof text, "test:%s:7: no such address: %s", host, gai_strerror(why));
+    assert_string_equal(err.text, text);
+}
+
 static void expect_no_opening(const struct socket_place *place, int code, const char *text)
 {
     char name[64];
@@ -285,9 +300,11 @@ static void test_states(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_codes),    cmocka_unit_test(test_groups_and_texts), cmocka_unit_test(test_opening),
-        cmocka_unit_test(test_settings), cmocka_unit_test(test_own_end),          cmocka_unit_test(test_bytes),
-        cmocka_unit_test(test_drain),    cmocka_unit_test(test_states),
+        cmocka_unit_test(test_codes),           cmocka_unit_test(test_groups_and_texts),
+        cmocka_unit_test(test_no_such_address), cmocka_unit_test(test_opening),
+        cmocka_unit_test(test_settings),        cmocka_unit_test(test_own_end),
+        cmocka_unit_test(test_bytes),           cmocka_unit_test(test_drain),
+        cmocka_unit_test(test_states),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -2,7 +2,7 @@
 /* Recordings of a stream with attributes. Points wait for them, and are written with their own or with none. */
 #include "tests/unit/recorder_rig.h"
 
-enum { SHOTS = 10 };
+enum { SHOTS = 10, LONG = 600 };
 
 static uint8_t out[1 << 16];
 static uint32_t seq;
@@ -152,6 +152,65 @@ static void test_moving(void **state)
     free(text);
 }
 
+/* Every other pulse has a second echo, so echoes come as 1 of 1, 1 of 2 and 2 of 2. */
+static void put_long_frame(void)
+{
+    static uint32_t a[LONG], zero[LONG], dt[LONG];
+    static int16_t refl[LONG], amplitude[LONG];
+    static uint16_t label[LONG], width[LONG];
+    static uint8_t echo[LONG];
+    for (uint32_t i = 0; i < LONG; i++) {
+        a[i] = 5000 + i;
+        dt[i] = (i - i / 3) * 10000;
+        refl[i] = (int16_t)-i;
+        label[i] = (uint16_t)(i % 7);
+        echo[i] = i % 3 == 0 ? 0x11 : i % 3 == 1 ? 0x21 : 0x22;
+        amplitude[i] = (int16_t)i;
+        width[i] = (uint16_t)(400 + i);
+    }
+    const struct line_block block = {.n_pulses = LONG - LONG / 3,
+                                     .n_points = LONG,
+                                     .dt_ns = dt,
+                                     .a = a,
+                                     .b = zero,
+                                     .c = zero,
+                                     .refl_cdb = refl,
+                                     .echo = echo,
+                                     .label = label,
+                                     .amplitude_cdb = amplitude,
+                                     .width_cns = width};
+    put(native_encode_points(out, sizeof out, &block, 0), -1);
+}
+
+/* The frame holds more points than a batch, so batch after batch is filled again from the points that waited. Each has
+ * its own figures. */
+static void test_long_frame(void **state)
+{
+    (void)state;
+    rig_begin();
+    put_descriptor(1, NATIVE_HAS_ATTRIBUTES);
+    put_anchor(0);
+    put_long_frame();
+    char *text = rig_record_bytes("a.ply", (struct recorder_options){.ascii = 1}, NULL);
+    const char *at = strstr(text, "end_header\n") + 11;
+    for (int i = 0; i < LONG; i++) {
+        double place[3], v[5];
+        int n[4], used;
+        assert_int_equal(sscanf(at, "%lf %lf %lf %lf %lf %lf %d %d %d %d %lf %lf\n%n", place, place + 1, place + 2, v,
+                                v + 1, v + 2, n, n + 1, n + 2, n + 3, v + 3, v + 4, &used),
+                         12);
+        at += used;
+        const double want[] = {5 + 1e-3 * i, -0.01 * i, 1e-5 * (i - i / 3), 0.01 * i, 4 + 0.01 * i};
+        for (int k = 0; k < 5; k++) /* reflectance, amplitude and width have two decimals, and steps of 0.01 */
+            if (fabs(v[k] - want[k]) > (k == 0 || k == 2 ? 1e-9 : 5e-3))
+                fail_msg("point %d, figure %d: %g", i, k, v[k]);
+        assert_true(fabs(place[0] - 15 - 1e-3 * i) < 1e-6 && fabs(place[1] - 20) < 1e-6 && fabs(place[2] - 30) < 1e-6);
+        assert_true(n[0] == 1 + (i % 3 == 2) && n[1] == 1 + (i % 3 != 0) && n[2] == i % 7 && n[3] == 1);
+    }
+    assert_int_equal(*at, 0);
+    free(text);
+}
+
 /* The file is binary, with the empty shot: two floats after each vertex. */
 static void test_binary(void **state)
 {
@@ -273,8 +332,8 @@ static void test_library(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_moving), cmocka_unit_test(test_binary),  cmocka_unit_test(test_time),
-        cmocka_unit_test(test_kinds),  cmocka_unit_test(test_library),
+        cmocka_unit_test(test_moving), cmocka_unit_test(test_long_frame), cmocka_unit_test(test_binary),
+        cmocka_unit_test(test_time),   cmocka_unit_test(test_kinds),      cmocka_unit_test(test_library),
     };
     return cmocka_run_group_tests_name("track_attributes", tests, rig_set_up, rig_tear_down);
 }

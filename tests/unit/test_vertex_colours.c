@@ -306,6 +306,24 @@ static void hits_have_the_colour_between(void **state)
     scene_free(s);
 }
 
+/* A point has the mean of the corners' colours, weighted by areas: a quarter of the first one's, a half of the second
+ * one's and a quarter of the third one's here. Where a corner has no colour, the point has none. */
+static void colours_between_corners(void **state)
+{
+    (void)state;
+    static const double corner[3][3] = {{1, 2, 3}, {5, 2, 3}, {1, 2, 7}}, p[3] = {3, 2, 4};
+    const double *const corners[3] = {corner[0], corner[1], corner[2]};
+    uint8_t of[2][3][4] = {{{0}}, {{200, 0, 40, 255}, {0, 100, 40, 255}, {0, 200, 40, 255}}}, rgb[3];
+    const struct scene scene = {.n_triangles = 2, .rgb = of};
+    assert_int_equal(scene_rgb_at(&scene, 1, corners, p, rgb), 1);
+    assert_memory_equal(rgb, ((const uint8_t[3]){50, 100, 40}), 3);
+    for (int c = 0; c < 3; c++) {
+        of[1][c][3] = 0;
+        assert_int_equal(scene_rgb_at(&scene, 1, corners, p, rgb), 0);
+        of[1][c][3] = 255;
+    }
+}
+
 /* Without a rule the reflectance is the colour's luminance, 0.2126 of red and so on, in linear light. */
 static void hits_reflect_as_their_colour(void **state)
 {
@@ -369,6 +387,7 @@ int main(void)
         cmocka_unit_test(nothing_is_spent_without),
         cmocka_unit_test(colours_stay_with_triangles),
         cmocka_unit_test(hits_have_the_colour_between),
+        cmocka_unit_test(colours_between_corners),
         cmocka_unit_test(hits_reflect_as_their_colour),
         cmocka_unit_test(the_order_of_colours),
     };

@@ -115,6 +115,23 @@ static void test_hidden(void **state)
     }
 }
 
+/* Two overlapping discs are at the same depth. They meet halfway between their points, in either order, as do the cells
+ * of two neighbours on a wall. Each disc is 20 pixels wide, and the points are 10 pixels apart: columns 95 and 105. */
+static void test_overlap(void **state)
+{
+    (void)state;
+    for (int order = 0; order < 2; order++) {
+        struct view *view = make((const double[3]){0, 0, 0}, (const double[3]){0, 10, 0}, M_PI / 2, 2);
+        for (int pass = 0; pass < 2; pass++)
+            add(view, pass == order ? -0.5 : 0.5, 10, 0, pass == order ? red : blue);
+        struct picture picture = draw(view, 0);
+        for (uint32_t column = 87; column < 113; column++)
+            assert_memory_equal(at(&picture, column, 75), column < 100 ? red : blue, 3);
+        picture_free(&picture);
+        view_free(view);
+    }
+}
+
 static void test_counts(void **state)
 {
     (void)state;
@@ -324,6 +341,7 @@ int main(void)
         cmocka_unit_test(low_and_high_mean_the_same_in_views),
         cmocka_unit_test(test_pinhole),
         cmocka_unit_test(test_hidden),
+        cmocka_unit_test(test_overlap),
         cmocka_unit_test(test_counts),
         cmocka_unit_test(test_shade),
         cmocka_unit_test(test_range),
