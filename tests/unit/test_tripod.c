@@ -168,6 +168,9 @@ static void no_ground_is_said(void **state)
         warned,
         "station 1 station-1: tripod: there is no ground below it, so its legs have their smallest opening, 30 deg\n"));
     assert_true(fabs(site->station[0].tripod.cast.cos_opening - sqrt(0.75)) < 1e-15);
+    char text[256];
+    site_describe_tripod(&site->station[0], text, sizeof text);
+    assert_string_equal(text, "legs of 1.8 m, no ground below; opening 30 deg");
     site_free(site);
 }
 
