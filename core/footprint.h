@@ -166,7 +166,7 @@ struct beam_merging {
     int by_surface;      /* 1: an echo's surface is the one that returns most; 0: that of its strongest return */
     uint32_t most;       /* echoes of a pulse; the weakest are left out */
     const struct detect_signal *signal; /* for weights by received power; NULL: distance has no part in them */
-    double least_m;                     /* with a signal: nothing is received from below */
+    double least_m;                     /* with a signal: planes below are not received */
 };
 /* Sets how the returns of a footprint are merged, as defined above, without a signal. */
 void beam_merging(const struct beam *beam, uint32_t most, struct beam_merging *how);

@@ -56,14 +56,14 @@ static int set_gains(const struct beam_merging *how, struct beam_return *r, uint
         far_m = r[i].range_m > far_m ? r[i].range_m : far_m;
     if (!beam_is_deep(how->signal, near_m, far_m - near_m, far_m - near_m)) return 0;
     for (uint32_t i = 0; i < n; i++) {
-        r[i].plane_m = r[i].plane_m > near_m ? fmin(r[i].plane_m, far_m) : near_m; /* near_m for NaN, too */
+        /* An axis that turns past a plane's direction meets it ever farther away, and then behind the head. */
+        r[i].plane_m = r[i].plane_m >= 0.0 ? fmin(fmax(r[i].plane_m, near_m), far_m) : far_m; /* also for NaN */
         first_m = fmin(first_m, r[i].plane_m);
         last_m = fmax(last_m, r[i].plane_m);
     }
-    /* A return that is not received has no weight, wherever its plane meets the axis. */
-    if (near_m >= how->least_m && !beam_is_deep(how->signal, near_m, far_m - near_m, last_m - first_m)) return 0;
+    if (!beam_is_deep(how->signal, near_m, far_m - near_m, last_m - first_m)) return 0;
     for (uint32_t i = 0; i < n; i++)
-        r[i].gain = r[i].range_m < how->least_m ? 0.0 : gain_at(how, fmax(r[i].plane_m, how->least_m));
+        r[i].gain = gain_at(how, r[i].plane_m);
     return 1;
 }
 

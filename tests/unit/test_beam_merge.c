@@ -284,7 +284,10 @@ static void test_received_power(void **state)
     two[1].plane_m = 1.0; /* both on one plane: distance has no part */
     assert_int_equal(beam_merge(&few, two, 2, echo, &left_out), 1);
     assert_true(echo[0].label == 2 && fabs(echo[0].range_m - 1.3) < 1e-12 && echo[0].back == 1.0);
-    few.least_m = 1.2; /* nothing is received from the first */
+    few.least_m = 1.2; /* both are on a plane that is too near; one ray has the same mean */
+    assert_int_equal(beam_merge(&few, two, 2, echo, &left_out), 1);
+    assert_true(fabs(echo[0].range_m - 1.3) < 1e-12);
+    two[1].plane_m = 1.5; /* nothing is received from the first */
     assert_int_equal(beam_merge(&few, two, 2, echo, &left_out), 1);
     assert_true(fabs(echo[0].range_m - 1.5) < 1e-12 && fabs(echo[0].back / 0.6 - 1.0) < 1e-9);
 }
@@ -314,6 +317,16 @@ static void test_alike_planes(void **state)
         assert_int_equal(bits >> i & 1, i % 3 != 1);
         assert_int_equal(far >> i & 1, i % 3 == 0);
     }
+    /* The smallest range lies within a pulse. Its plane is received as a whole, in both ways. */
+    struct beam_return r[N];
+    struct beam_echo one;
+    uint64_t left_out = 0;
+    with.least_m = 1.05;
+    assert_int_equal(beam_merge_alike(&with, &all, alike), bits);
+    for (uint32_t j = 0; j < N; j++)
+        r[j] = (struct beam_return){.range_m = range_m[2 * N + j], .plane_m = 1.06, .energy = 1.0 / N, .back = 1.0 / N};
+    assert_int_equal(beam_merge(&with, r, N, &one, &left_out), 1);
+    assert_true(one.range_m == alike[2].range_m);
 }
 
 /* ---- several pulses at a time */
