@@ -81,7 +81,7 @@ UNIT_DIR = $(PREFIX)/lib/systemd/system
 PC_DIR = $(PREFIX)/$(LIB)/pkgconfig
 MAN_DIR = $(PREFIX)/share/man
 COMPLETION_DIR = $(PREFIX)/share/bash-completion/completions
-# PRINTER prints manual pages and the completion. In a build for another machine it is a program that runs here.
+# PRINTER prints manual pages and the completion, and PRINTER with a d those of scanheadd. In a build for another machine it is a program that runs here.
 PRINTER = $(BUILD)/scanhead
 WIRESHARK_DIR = $(PREFIX)/share/scanhead/wireshark
 ALL_CPPFLAGS = -I. -D_GNU_SOURCE -DSH_EMBREE=$(EMBREE_VERSION) $(if $(USBREDIR),-DHAVE_USBREDIR) -MMD -MP $(CPPFLAGS)
@@ -484,17 +484,18 @@ check-place:
 	@case "$$GIVEN_PREFIX" in ""|/*) ;; *) \
 		printf '%s\n' "make install: PREFIX=$$GIVEN_PREFIX is relative; a path that begins with / is allowed" >&2; exit 1;; esac
 INSTALL_LIST = $(PREFIX)/share/scanhead/installed.txt
-# A trial (make -n) makes no folder.
+# A trial (make -n) shows what would be installed, and makes no folder.
 IS_TRIAL = $(findstring n,$(filter-out --%,$(firstword -$(MAKEFLAGS))))
+STAGED = umask 022; stage=$$(mktemp -d) || exit; trap 'rm -rf "$$stage"' EXIT; trap 'exit 1' HUP INT TERM; \
+	$(MAKE) --no-print-directory stage STAGE="$$stage" && sh config/packaging/install.sh "$$stage" "$(DESTDIR)" "$(INSTALL_LIST)"
 install: check-place $(if $(filter yes,$(BUILT)),,all)
-	$(eval STAGE := $(if $(IS_TRIAL),STAGE,$(shell mktemp -d)))
-	@umask 022; $(MAKE) --no-print-directory stage STAGE="$(STAGE)" || { rm -rf "$(STAGE)"; exit 1; }
-	@sh config/packaging/install.sh "$(STAGE)" "$(DESTDIR)" "$(INSTALL_LIST)"
+	@$(if $(IS_TRIAL),$(MAKE) --no-print-directory stage STAGE=STAGE,$(STAGED))
 #? uninstall         removes what make install has put below PREFIX and DESTDIR
 uninstall: check-place
 	@sh config/packaging/install.sh --remove "$(DESTDIR)" "$(INSTALL_LIST)"
 # All that is installed is put into STAGE first, so that nothing is installed where a part is missing.
 stage:
+	@[ -n "$(STAGE)" ] || { echo "make stage: STAGE is the folder that gets the files" >&2; exit 1; }
 	install -d "$(STAGE)$(PREFIX)/bin" "$(STAGE)$(PREFIX)/$(LIB)" "$(STAGE)$(PREFIX)/include" "$(STAGE)$(HEADS_DIR)" \
 		"$(STAGE)$(SCENES_DIR)" "$(STAGE)$(FAULTS_DIR)" "$(STAGE)$(CAMPAIGN_DIR)" "$(STAGE)$(UDEV_DIR)" "$(STAGE)$(PC_DIR)" "$(STAGE)$(PREFIX)/share/scanhead/python" \
 		"$(STAGE)$(WIRESHARK_DIR)" "$(STAGE)$(UNIT_DIR)" "$(STAGE)$(COMPLETION_DIR)" \
@@ -517,10 +518,10 @@ stage:
 	install -D -m 644 LICENSE "$(STAGE)$(PREFIX)/share/doc/scanhead/LICENSE"
 	install -m 644 drivers/host/70-scanhead.rules "$(STAGE)$(UDEV_DIR)/"
 	sed "s|@PREFIX@|$(subst %,%%,$(PREFIX))|" config/packaging/scanhead@.service.in > "$(STAGE)$(UNIT_DIR)/scanhead@.service"
-	for program in $(PRINTER)d $(PRINTER); do \
-		pages=$$($$program help --man list) && for p in $$pages; do \
-			$$program help --man $$p > "$(STAGE)$(MAN_DIR)/man$${p##*.}/$$p" || exit; done && \
-		$$program help --completion bash > "$(STAGE)$(COMPLETION_DIR)/$${program##*/}" || exit; done
+	for d in d ""; do \
+		pages=$$($(PRINTER)$$d help --man list) && for p in $$pages; do \
+			$(PRINTER)$$d help --man $$p > "$(STAGE)$(MAN_DIR)/man$${p##*.}/$$p" || exit; done && \
+		$(PRINTER)$$d help --completion bash > "$(STAGE)$(COMPLETION_DIR)/scanhead$$d" || exit; done
 	awk -f drivers/host/libscanhead.3.awk drivers/host/scanhead.h > "$(STAGE)$(MAN_DIR)/man3/libscanhead.3"
 	sed "s|@PREFIX@|$(PREFIX)|; s|@LIB@|$(LIB)|; s|@VERSION@|$$(sed -n 's/^#define SCANHEAD_VERSION  *"\(.*\)"$$/\1/p' \
 		drivers/host/scanhead.h)|" drivers/host/libscanhead.pc.in > "$(STAGE)$(PC_DIR)/libscanhead.pc"

@@ -65,7 +65,23 @@ uninstall_it() {
 all_or_nothing() {
     mkdir "$work/part" && cp "$(dirname "$program")/scanhead" "$work/part/" && mkdir "$work/nothing" &&
         ! env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -s install BUILT=yes BUILD="$work/part" DESTDIR="$work/nothing" \
-            2>"$work/said" && test -z "$(ls "$work/nothing")"
+            2>"$work/said" && test -z "$(ls "$work/nothing")" || return
+    # Nothing goes elsewhere where there is no folder for the stage.
+    ! TMPDIR=$work/none/at/all env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -s install BUILT=yes BUILD="$(dirname "$program")" \
+        DESTDIR="$work/nothing" PREFIX="$work/elsewhere" 2>"$work/said" && test ! -e "$work/elsewhere" -a -z "$(ls "$work/nothing")"
+}
+
+# A copy of an installation has a list of the original's files. What is not yet complete can be taken back.
+copies_stay_apart() {
+    at=$work/apart
+    env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -s install BUILT=yes BUILD="$(dirname "$program")" PREFIX="$at/a" && cp -a "$at/a" "$at/b" &&
+        ! make_uninstall "$at/b" 2>"$work/said" && test -x "$at/a/bin/scanhead" -a -x "$at/b/bin/scanhead" || return
+    rm "$at/a/bin/scanheadd" && mkdir -p "$at/a/bin/scanheadd/in" || return
+    ! env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -s install BUILT=yes BUILD="$(dirname "$program")" PREFIX="$at/a" 2>"$work/said" || return
+    rmdir "$at/a/bin/scanheadd/in" "$at/a/bin/scanheadd" && make_uninstall "$at//a/" && test -z "$(find "$at/a" ! -type d)"
+}
+make_uninstall() {
+    env -u MAKEFLAGS -u MFLAGS -u MAKELEVEL make -s uninstall PREFIX="$1"
 }
 
 config() {
@@ -120,6 +136,7 @@ check "a prefix with a percent sign, and prefixes that are refused" odd_prefixes
 check "all can read it, whatever the umask" all_can_read
 check "make uninstall" uninstalls
 check "where a file is missing, nothing is installed" all_or_nothing
+check "copies stay apart, and a part can be taken back" copies_stay_apart
 check "the udev rule is where udev looks below a prefix" test -s "$work/root$prefix/lib/udev/rules.d/70-scanhead.rules"
 check "the dissector for Wireshark is where its README says" cmp drivers/protocol/wireshark/scanhead.lua \
     "$work/root$prefix/share/scanhead/wireshark/scanhead.lua"

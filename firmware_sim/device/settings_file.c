@@ -303,6 +303,8 @@ int settings_file_look(const char *path, const char *profile, struct settings_fi
         if (rc == SH_ESTATE) rc = open_of_a_head(file, &why);
     }
     if (rc == SH_OK && file->fd >= 0) rc = read_from(file, &why);
+    if (file->fd >= 0) close(file->fd); /* a head may take it now */
+    file->fd = -1;
     return hand_out(rc, &why, file, out, err);
 }
 

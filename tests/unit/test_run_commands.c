@@ -233,7 +233,7 @@ static void options_that_do_not_fit(void **state)
          "--clients 5: the links have room for 4; allowed is that many, or more links"},
         {"s.shs --start --clients 1 --link null",
          "--clients 1: the links have room for 0; allowed is that many, or more links"},
-        {"s.shs --link null", "s.shs: without --start a client begins the replay, and null and file links have none"},
+        {"s.shs --link null", "s.shs: without --start a client begins the replay, and null, file and udp links have"},
         {"s.shs --link pty --link bogus", "--link:2: links[1].type: \"bogus\" is not known"},
         {"s.shs --start --speed 2 --pace fast --link null", "--speed: allowed only with the pace realtime"},
         {"s.shs --link a#b", "--link 'a#b': allowed are pty, tcp, ... or keys such as 'type: tcp, port: 5025'"},

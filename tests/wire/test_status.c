@@ -92,7 +92,7 @@ static const struct {
     {"view @faulty.yaml", WRONG},
     {"record @none.shs -o @x.ply", WRONG},
     {"record @fifo.shs -o @x.ply", WRONG},
-    {"run @none.shs --link null", WRONG},
+    {"run @none.shs --link null --start", WRONG},
     {"run @none.pcap", WRONG},
     {"run @scan.shs --link null", WRONG}, /* nobody could begin it */
     {"run @empty.shs --start --link null", WRONG},
