@@ -6,6 +6,9 @@
 # The lines below name programs that can't run under an emulator, each with the reason:
 # not emulated: test_functionfs QEMU's user mode has none of the kernel's asynchronous I/O (io_setup)
 # not emulated: test_functionfs_whole QEMU's user mode has none of the kernel's asynchronous I/O (io_setup)
+# not emulated: test_ifc_stubs QEMU's user mode keeps limits of address space from the kernel (RLIMIT_AS)
+# not emulated: test_import_apart QEMU's user mode keeps limits of address space from the kernel (RLIMIT_AS)
+# not emulated: test_late QEMU's user mode keeps limits of address space from the kernel (RLIMIT_AS)
 # not emulated: test_link_baud QEMU's user mode has no rates of a terminal but the old ones (TCGETS2)
 # not emulated: test_link_cable QEMU's user mode has no IP_MINTTL, by which a cable is drawn
 # not emulated: test_link_udp QEMU's user mode takes the number of an interface for another one (IP_ADD_MEMBERSHIP)
