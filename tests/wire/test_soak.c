@@ -145,7 +145,7 @@ static void test_each_scenario_over_tcp(void **state)
     assert_int_equal(rename(room_config_write(wire, &SCANNER), scanner), 0);
     room_config_write(wire, &SLOW);
     for (int i = 0; i < N_SCENARIOS; i++)
-        pid[i] = start(wire, SCENARIOS[i].name, "2", "1");
+        pid[i] = start(wire, SCENARIOS[i].name, "3", "1");
     for (int i = 0; i < N_SCENARIOS; i++) {
         const int status = wire_wait(wire, pid[i]);
         if (status != 0) {
