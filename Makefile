@@ -81,7 +81,8 @@ UNIT_DIR = $(PREFIX)/lib/systemd/system
 PC_DIR = $(PREFIX)/$(LIB)/pkgconfig
 MAN_DIR = $(PREFIX)/share/man
 COMPLETION_DIR = $(PREFIX)/share/bash-completion/completions
-# PRINTER prints manual pages and the completion, and PRINTER with a d those of scanheadd. In a build for another machine it is a program that runs here.
+# PRINTER prints manual pages and the completion, and PRINTER with a d those of scanheadd. In a build for another
+# machine both are programs that run here.
 PRINTER = $(BUILD)/scanhead
 WIRESHARK_DIR = $(PREFIX)/share/scanhead/wireshark
 ALL_CPPFLAGS = -I. -D_GNU_SOURCE -DSH_EMBREE=$(EMBREE_VERSION) $(if $(USBREDIR),-DHAVE_USBREDIR) -MMD -MP $(CPPFLAGS)

@@ -12,7 +12,11 @@
 #ifndef CORE_NEWFILE_H
 #define CORE_NEWFILE_H
 
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
 #include <stdio.h>
+#include <string.h>
 #include <unistd.h>
 
 #include "core/err.h"
@@ -50,6 +54,14 @@ static inline FILE *newfile_stream(int fd, const char *mode)
 /* Before long work: checks whether newfile_part would make `path`, with `path`.part as its part. The check leaves no
  * file behind: a part that a killed writer has left is removed. */
 int newfile_check(const char *path, struct sh_err *err);
+/* Returns 0 where files can be made in the folder of `path`, else the reason as errno has it. */
+static inline int newfile_folder_error(const char *path)
+{
+    char folder[PATH_MAX];
+    const char *slash = strrchr(path, '/');
+    snprintf(folder, sizeof folder, "%.*s", slash != NULL ? (int)(slash - path) + 1 : 0, path);
+    return faccessat(AT_FDCWD, folder[0] != '\0' ? folder : ".", W_OK | X_OK, AT_EACCESS) == 0 ? 0 : errno;
+}
 /* Says in err that the path is a symbolic link, and where it leads. Returns SH_EINPUT. */
 int newfile_fail_link(const char *path, struct sh_err *err);
 /* Opens the `part` that a killed writer has left: an existing regular file, for reading and writing, locked as

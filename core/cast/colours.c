@@ -6,6 +6,7 @@
 
 #include "core/cast/chunk.h"
 #include "core/cast/echoes.h"
+#include "core/cast/optics.h"
 #include "core/colour.h"
 
 /* Returns the frame scalar at the time when a pulse of the chunk fires: a number that a trajectory has at each time
@@ -56,7 +57,7 @@ static uint32_t colour_of(struct coloured *c, uint32_t i, uint32_t pulse)
     const struct chunk *k = c->k;
     const struct colour_scale *scale = &k->s->colour->scale;
     const struct echo_list *l = c->list;
-    const int signal = k->s->detect != NULL && k->s->detect->signal != NULL;
+    const int signal = caster_signal(k->s) != NULL;
     uint8_t rgb[3] = {scale->rgb[0], scale->rgb[1], scale->rgb[2]};
     switch (scale->mode) {
     case COLOUR_RANGE:

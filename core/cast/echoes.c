@@ -166,7 +166,7 @@ static void detect(struct caster *c, const struct chunk *k)
 /* A user who sets fixed noise together with a signal model wants it fixed: a soiled window does not change it then. */
 static double fixed_sigma_m(const struct cast_setup *s)
 {
-    const int is_modelled = s->detect != NULL && s->detect->signal != NULL;
+    const int is_modelled = caster_signal(s) != NULL;
     return s->disturbance != NULL && !is_modelled ? s->range_sigma_m / s->disturbance->share : s->range_sigma_m;
 }
 
@@ -285,7 +285,7 @@ static void choose_echoes(struct caster *c, const struct chunk *k)
 {
     const struct cast_setup *s = k->s;
     struct echo_list *l = &c->list;
-    const double *strength = s->detect != NULL && s->detect->signal != NULL ? l->amplitude : l->rho;
+    const double *strength = caster_signal(s) != NULL ? l->amplitude : l->rho;
     const uint32_t most = caster_max_echoes(s);
     uint32_t end = k->n;
     for (uint32_t g = 0; g < l->n_secondary; g++) {

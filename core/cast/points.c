@@ -64,7 +64,7 @@ static uint32_t write_firsts(struct caster *c, const struct chunk *k)
     struct line_block *b = k->block;
     int16_t *refl_cdb = b->refl_cdb + k->at; /* a pointer of its own lets the loop become vector code */
     const uint8_t *echo = b->echo + k->at;
-    const int signal = k->s->detect != NULL && k->s->detect->signal != NULL;
+    const int signal = caster_signal(k->s) != NULL;
     uint32_t echoes = kernel_entries(l->range_m, l->label, k->n, b->echo + k->at, b->label + k->at);
     if (signal)
         kernel_values(l->refl_cdb, echo, k->n, (int16_t)LINE_REFL_NONE, refl_cdb);
@@ -106,7 +106,7 @@ static void write_secondary(struct caster *c, const struct chunk *k, uint32_t to
 {
     const struct echo_list *l = &c->list;
     struct line_block *b = k->block;
-    const int signal = k->s->detect != NULL && k->s->detect->signal != NULL;
+    const int signal = caster_signal(k->s) != NULL;
     b->a[to] = c->secondary_a[i - k->n];
     b->b[to] = c->secondary_b[i - k->n];
     b->c[to] = c->secondary_c[i - k->n];

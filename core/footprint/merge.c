@@ -150,8 +150,9 @@ static int make_echo(const struct beam_merging *how, struct beam_return *r, uint
     const double energy = sum_weights(r, n, BY_ENERGY);
     if (energy < how->least_energy) return 0;
     enum weighting by = n > 1 && set_gains(how, r, n) ? BY_POWER : BY_BACK;
-    double all = sum_weights(r, n, by), back = by == BY_POWER && all > 0.0 ? joint_back(how, r, n, all) : all;
-    if (by == BY_POWER && !(all > 0.0)) all = back = sum_weights(r, n, by = BY_BACK);
+    double all = sum_weights(r, n, by);
+    if (by == BY_POWER && !(all > 0.0)) all = sum_weights(r, n, by = BY_BACK);
+    const double back = by == BY_POWER ? joint_back(how, r, n, all) : all;
     if (!(all > 0.0)) {
         by = BY_ENERGY;
         all = energy;

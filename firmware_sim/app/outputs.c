@@ -230,13 +230,10 @@ static int fail_file(const struct named *file, int code, const char *why, struct
 static int check_folder(const struct named *file, struct sh_err *err)
 {
     struct stat st;
-    char folder[PATH_MAX];
-    const char *name = basename(file->path);
     if (lstat(file->path, &st) != 0 && errno == ENAMETOOLONG)
         return fail_file(file, SH_EINPUT, strerror(ENAMETOOLONG), err);
-    snprintf(folder, sizeof folder, "%.*s", (int)(name - file->path), file->path);
-    if (faccessat(AT_FDCWD, folder[0] != '\0' ? folder : ".", W_OK | X_OK, AT_EACCESS) == 0) return SH_OK;
-    return fail_file(file, SH_EPERM, strerror(errno), err);
+    const int error = newfile_folder_error(file->path);
+    return error == 0 ? SH_OK : fail_file(file, SH_EPERM, strerror(error), err);
 }
 
 /* Tries whether a file can be filled that is perhaps opened only at the end of long work. Nothing is changed. A FIFO is

@@ -3,7 +3,6 @@
 
 #include <errno.h>
 #include <fcntl.h>
-#include <limits.h>
 #include <pthread.h>
 #include <stdarg.h>
 #include <stdint.h>
@@ -271,10 +270,9 @@ static int open_of_a_head(struct settings_file *file, struct sh_err *err)
 /* Checks whether a head could make the file, which is not there. */
 static int check_folder(const char *path, struct sh_err *err)
 {
-    char folder[PATH_MAX];
-    snprintf(folder, sizeof folder, "%.*s", (int)(basename(path) - path), path);
-    if (faccessat(AT_FDCWD, folder[0] != '\0' ? folder : ".", W_OK | X_OK, AT_EACCESS) == 0) return SH_OK;
-    return sh_fail(err, errno == ENOENT ? SH_EINPUT : SH_EPERM, "%s: cannot be made: %s", path, strerror(errno));
+    const int error = newfile_folder_error(path);
+    if (error == 0) return SH_OK;
+    return sh_fail(err, error == ENOENT ? SH_EINPUT : SH_EPERM, "%s: cannot be made: %s", path, strerror(error));
 }
 
 /* Hands the file out, or frees it after an error. */

@@ -219,9 +219,8 @@ int replay_open(struct config *cfg, const struct replay_options *options, struct
     r->wants_start = options->start;
     r->speed = options->speed > 0.0 ? options->speed : 1.0;
     r->loop = options->loop;
-    for (uint32_t i = 0; i < cfg->n_links; i++) /* such a link opens a session for itself */
-        r->n_clients -=
-            cfg->link[i].type == LINK_FILE || cfg->link[i].type == LINK_NULL || cfg->link[i].type == LINK_UDP;
+    for (uint32_t i = 0; i < cfg->n_links; i++)
+        r->n_clients -= !replay_has_clients(&cfg->link[i]);
     r->ends_then = options->start && !options->loop;
     r->bytes = malloc(REPLAY_MOST_BYTES + REPLAY_FRONT * REPLAY_FRONT_ROOM);
     int rc = r->bytes != NULL ? SH_OK : sh_fail(err, SH_ENOMEM, "no memory");

@@ -14,6 +14,7 @@
 #ifndef FIRMWARE_SIM_REPLAY_REPLAY_H
 #define FIRMWARE_SIM_REPLAY_REPLAY_H
 
+#include "drivers/link/link.h"
 #include "drivers/protocol/talk.h"
 #include "firmware_sim/loop/source.h"
 
@@ -34,6 +35,12 @@ struct replay_options {
     const char *truth;              /* file for the faults that are injected; NULL: none */
     const struct sh_report *report; /* warnings while it is played, from the player's thread */
 };
+
+/* Whether clients connect to the link: a null, file or udp link opens a session for itself. */
+static inline int replay_has_clients(const struct link_spec *link)
+{
+    return link->type != LINK_NULL && link->type != LINK_FILE && link->type != LINK_UDP;
+}
 
 /* Opens the recording and reads it until a descriptor and an anchor have come, or to its end. Of cfg, links, loop and
  * faults are used; its profile and settings are set from the recording, as far as links need them. cfg, and what

@@ -188,29 +188,18 @@ static void aim_in_window(const struct site *site, int i, double *line_rad, doub
 
 /* Returns the range of what is seen from a station in direction i of LOOKS; NaN: nothing is. sweep: the first pan
  * sweep. */
-static double look(const struct site *site, const struct site_station *s, const struct schedule_segment *sweep, int i,
-                   struct bvh_work *work)
+static double look(const struct site *site, const struct site_station *s, const struct schedule_segment *sweep, int i)
 {
-    const double *p = s->at.position_m;
-    double line, pan, dir[3], range_m;
-    uint32_t triangle;
+    double line, pan, dir[3];
     if (site->emitter.kind == EMITTER_LINE)
         aim_in_window(site, i, &line, &pan);
     else
         aim_in_frame(sweep, i, &line, &pan);
     mat3_apply(s->at.rotation, (const double[3]){sin(pan) * cos(line), cos(pan) * cos(line), sin(line)}, dir);
-    const struct bvh_rays ray = {.n = 1,
-                                 .from.at_m = {p[0], p[1], p[2]},
-                                 .dir = {&dir[0], &dir[1], &dir[2]},
-                                 .range_max_m = 1e9,
-                                 .scattered = 1,
-                                 .range_m = &range_m,
-                                 .triangle = &triangle};
-    bvh_hits(work, site->bvh, &ray);
-    return range_m;
+    return bvh_ray(site->bvh, s->at.position_m, dir);
 }
 
-static void check_view(const struct site *site, uint32_t i, struct bvh_work *work, const struct sh_report *report)
+static void check_view(const struct site *site, uint32_t i, const struct sh_report *report)
 {
     const struct config_program *program = program_of(site);
     const struct site_station *s = &site->station[i];
@@ -223,7 +212,7 @@ static void check_view(const struct site *site, uint32_t i, struct bvh_work *wor
     site_fill_spec(site, &settings, &spec);
     schedule_start(&sweep, &spec);
     for (int k = 0; k < LOOKS; k++) {
-        const double range_m = look(site, s, &sweep, k, work);
+        const double range_m = look(site, s, &sweep, k);
         near += range_m < program->range_min_m;
         far += range_m > program->range_max_m;
         seen += range_m >= program->range_min_m && range_m <= program->range_max_m;
@@ -249,16 +238,14 @@ static void check_view(const struct site *site, uint32_t i, struct bvh_work *wor
 static int check_stations(const struct site *site, const struct sh_report *report, struct sh_err *err)
 {
     const uint32_t step = site->n_stations / CONFIG_MAX_STATIONS + 1;
-    struct bvh_work *work;
-    int rc = bvh_work_create(&work, err);
+    int rc = SH_OK;
     for (uint32_t i = 0; i < site->n_stations && rc == SH_OK && !site->moving; i += step) {
         if (!config_serves(site->cfg, i)) continue;
         check_reach(site, i, report);
         if (site->n_movers > 0) continue;
         rc = check_floor(site, i, report, err);
-        if (rc == SH_OK) check_view(site, i, work, report);
+        if (rc == SH_OK) check_view(site, i, report);
     }
-    bvh_work_free(work);
     return rc;
 }
 

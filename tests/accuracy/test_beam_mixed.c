@@ -27,8 +27,8 @@ static long double meet(const struct two_plates *t, int plate, const long double
     return to / along;
 }
 
-/* What a pulse must measure: the mean range, the reflectance that belongs to it, and the share of the light that meets
- * the plate in front. */
+/* A pulse must measure the mean range, and the reflectance that belongs to it. front is the share of the light that
+ * meets the plate in front. */
 struct sum {
     double mean_m, reflectance, front;
 };

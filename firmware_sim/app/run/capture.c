@@ -43,8 +43,8 @@ static void given_links(const char *given, char *text, size_t cap)
     while (*given != '\0' && n < cap) {
         const size_t len = strcspn(given, "\n");
         const int says = memmem(given, len, "protocol:", 9) != NULL;
-        n +=
-            (size_t)snprintf(text + n, cap - n, "%.*s%s\n", (int)len - 2, given, says ? "}," : ", protocol: capture},");
+        const char *end = says ? "}," : ", protocol: capture},";
+        n += (size_t)snprintf(text + n, cap - n, "%.*s%s\n", (int)len - 2, given, end);
         given += len + (given[len] == '\n');
     }
 }

@@ -100,8 +100,7 @@ static int serve(const struct run_options *o, struct replay *replay, struct loop
 static int check_start(const struct run_options *o, const struct config *cfg, struct sh_err *err)
 {
     for (uint32_t i = 0; i < cfg->n_links; i++)
-        if (cfg->link[i].type != LINK_NULL && cfg->link[i].type != LINK_FILE && cfg->link[i].type != LINK_UDP)
-            return SH_OK;
+        if (replay_has_clients(&cfg->link[i])) return SH_OK;
     if (o->device.start) return SH_OK;
     return sh_fail(err, SH_EINPUT,
                    "%s: without --start a client begins the replay, and null, file and udp links have none; "

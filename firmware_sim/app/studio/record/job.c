@@ -388,8 +388,8 @@ int record_job_stream(struct record_job *r, struct sh_err *err)
     char why[512];
     int rc = open_stream(r, &sh, why, sizeof why);
     if (app_is_recording(r->source)) r->recording.file = r->source;
-    if (rc != SCANHEAD_OK) sh_fail(err, rc, "%s", why);
-    if (rc != SCANHEAD_OK) return r->recording.file != NULL ? sh_of_file(rc, err) : rc;
+    if (rc != SCANHEAD_OK) rc = sh_fail(err, rc, "%s", why);
+    if (rc != SH_OK) return r->recording.file != NULL ? sh_of_file(rc, err) : rc;
     struct stat st;
     if (r->recording.file != NULL) r->recording.listen = r->files.recorder.may_wait = 1;
     if (r->recording.listen && stat(r->source, &st) == 0 && S_ISREG(st.st_mode))

@@ -217,11 +217,17 @@ static int is_long_enough(const struct recording *r, const struct scanhead_frame
     return (double)native_since_ns(frame->t_ns, r->scan_t0_ns) >= 1e9 * r->o->duration_s;
 }
 
+/* Wrong bytes of a recording are wrong input. */
+static int of_source(const struct recording *r, int rc, struct sh_err *err)
+{
+    return r->o->file != NULL ? sh_of_file(rc, err) : rc;
+}
+
 static int fail_end(const struct recording *r, int code, const char *how, struct sh_err *err)
 {
     const char *file = r->o->file;
-    if (file == NULL) return sh_fail(err, code, "the stream ended %s", how);
-    return sh_of_file(sh_fail(err, code, "%s: the stream ended %s", file, how), err);
+    return of_source(
+        r, sh_fail(err, code, "%s%sthe stream ended %s", file != NULL ? file : "", file != NULL ? ": " : "", how), err);
 }
 
 /* Takes one frame. Returns 1: got one; 0: none in time; negative: the recording is over. */
@@ -234,8 +240,7 @@ static int step(struct recording *r, int timeout_ms, struct sh_err *err)
     if (reported != SH_OK) return reported;
     if (rc == SCANHEAD_ETIMEOUT) return 0;
     if (is_gone(r, rc) && !r->is_done) return replug(r, rc, err);
-    if (rc != SCANHEAD_OK) sh_fail(err, rc, "%s", scanhead_error(r->sh));
-    if (rc != SCANHEAD_OK) return r->o->file != NULL ? sh_of_file(rc, err) : rc;
+    if (rc != SCANHEAD_OK) return of_source(r, sh_fail(err, rc, "%s", scanhead_error(r->sh)), err);
     look_at(r, &frame);
     if (frame.type == SCANHEAD_POINTS) {
         r->heard_ns = r->pulses_ns = r->now_ns;
